@@ -1,0 +1,11 @@
+// One file per subject binds itself through one of these; module.cpp calls them all.
+#pragma once
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+namespace luch::bindings {
+namespace py = pybind11;
+
+void bind_math(py::module_& m);
+
+}  // namespace luch::bindings

@@ -1,0 +1,6 @@
+#include "bindings/bind.h"
+
+PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
+    m.doc() = "Luch's native core.";
+    luch::bindings::bind_math(m);
+}

@@ -1,0 +1,37 @@
+// The one header that asks which compiler reads it. Everything else is plain C++20 that the C++
+// compiler and NVRTC both accept: no standard header, no allocation, no exceptions, no statics.
+#pragma once
+
+#if defined(__CUDACC_RTC__) || defined(__CUDACC__)
+#define LUCH_CUDA 1
+#define LUCH_FN __host__ __device__ __forceinline__
+#define LUCH_FN_SLOW __host__ __device__ __noinline__
+#define LUCH_CONST __device__ constexpr
+#else
+#define LUCH_CUDA 0
+#define LUCH_FN inline __attribute__((always_inline))
+#define LUCH_FN_SLOW inline
+#define LUCH_CONST inline constexpr
+#endif
+
+namespace luch {
+
+using i8 = signed char;
+using u8 = unsigned char;
+using i16 = short;
+using u16 = unsigned short;
+using i32 = int;
+using u32 = unsigned int;
+using i64 = long long;
+using u64 = unsigned long long;
+
+inline constexpr float PI = 3.14159265358979323846f;
+inline constexpr float INV_PI = 0.31830988618379067154f;
+inline constexpr float TWO_PI = 6.28318530717958647692f;
+inline constexpr float INFINITE_DISTANCE = __builtin_huge_valf();
+inline constexpr u32 NONE = 0xffffffffu;  // "no index" in every index field
+
+LUCH_FN u32 float_bits(float x) { return __builtin_bit_cast(u32, x); }
+LUCH_FN float bits_float(u32 x) { return __builtin_bit_cast(float, x); }
+
+}  // namespace luch

@@ -1,0 +1,49 @@
+// What a shader program can ask about the point it shades. Structure of arrays: one chunk of
+// SHADE_LANES points that share a program, so that each operation is one tight loop.
+#pragma once
+#include "luch/math/vec.h"
+
+namespace luch {
+
+// 64 lanes: 64 float registers of 64 lanes are 16 KiB, half of a first-level cache.
+inline constexpr int SHADE_LANES = LUCH_CUDA ? 1 : 64;
+
+// Path facts for the Light Path node and for closures (caustics switches).
+enum PathFlag : u32 {
+    PATH_CAMERA = 1u,
+    PATH_SHADOW = 2u,
+    PATH_DIFFUSE = 4u,
+    PATH_GLOSSY = 8u,       // includes singular
+    PATH_SINGULAR = 16u,    // the last bounce was a delta lobe
+    PATH_REFLECT = 32u,
+    PATH_TRANSMIT = 64u,    // the last bounce went through a surface (not transparent)
+    PATH_VOLUME = 128u,
+    PATH_EMISSION_ONLY = 256u,  // the program runs for its emission alone (light sampling)
+    PATH_BACKFACING = 512u,     // the ray meets the surface from behind
+    PATH_TRANSPARENT_ONLY = 1024u,  // the program runs for its transparency alone (shadow rays)
+    PATH_DIFFUSE_ANCESTOR = 2048u,  // a diffuse bounce lies somewhere before (caustics switches)
+};
+
+struct alignas(64) ShadePoints {
+    int count;
+    // Position, world (camera-relative) space; footprint of the ray there (see dP).
+    float px[SHADE_LANES], py[SHADE_LANES], pz[SHADE_LANES];
+    // Shading normal and geometric normal, unit, world, both flipped to the side of the ray.
+    float nx[SHADE_LANES], ny[SHADE_LANES], nz[SHADE_LANES];
+    float gx[SHADE_LANES], gy[SHADE_LANES], gz[SHADE_LANES];
+    // Unit direction from the point towards where the ray came from.
+    float ix[SHADE_LANES], iy[SHADE_LANES], iz[SHADE_LANES];
+    float u[SHADE_LANES], v[SHADE_LANES];       // barycentrics, as in Hit
+    float ray_length[SHADE_LANES];              // distance travelled by the last ray, metres
+    float footprint[SHADE_LANES];               // radius of the ray's pixel cone at the point, metres
+    u32 flags[SHADE_LANES];                     // PathFlag
+    u32 prim[SHADE_LANES], instance[SHADE_LANES];
+    u32 depth[SHADE_LANES];                     // bounces so far: total | diffuse<<8 | glossy<<16 | transmission<<24
+    u32 transparent_depth[SHADE_LANES];
+    u32 path[SHADE_LANES];                      // caller's path index
+    u32 seed[SHADE_LANES];                      // hash for stochastic nodes (none deterministic needs it)
+    // For lamps and the world: the point is a direction; px..pz hold it, instance = NONE,
+    // prim = light index for a lamp and NONE for the world.
+};
+
+}  // namespace luch

@@ -1,0 +1,94 @@
+// The scene as kernels see it: plain pointers, filled once by cpu/scene_store (and its CUDA twin).
+#pragma once
+#include "luch/geometry/ray.h"
+#include "luch/math/vec.h"
+#include "luch/shade/op.h"
+
+namespace luch {
+
+enum class Domain : u8 { NONE_, POINT, CORNER, FACE, MESH };
+
+struct AttributeView {
+    u32 offset;   // into SceneView::attribute_data, floats
+    u8 channels;  // 0: this mesh has no such attribute
+    Domain domain;
+};
+
+struct MeshView {
+    u32 first_vertex, vertex_count;      // into positions
+    u32 first_triangle, triangle_count;  // into triangles, material_slots
+    u32 first_normal;                    // into normals; by normals_domain
+    Domain normals_domain;               // NONE_: flat
+    u32 first_attribute;                 // attributes[first_attribute + attribute id]
+    Vec3 texture_location, texture_size;
+};
+
+enum InstanceFlag : u32 { INSTANCE_HOLDOUT = 1u, INSTANCE_SHADOW_CATCHER = 2u, INSTANCE_MIRRORED = 4u };
+
+struct InstanceView {
+    Affine to_world, to_object;
+    u32 mesh, object;
+    u32 first_material;  // materials = material_table[first_material + slot]
+    u32 material_count;
+    u32 visibility;      // RayKind bits
+    u32 flags;           // InstanceFlag
+    float random;
+    Vec3 generated;      // of the instancer
+    Vec2 uv;
+};
+
+struct ObjectView {
+    float pass_index;
+    float color[4];
+    Vec3 location;       // world
+    u32 lightgroup;      // bit index + 1, 0: none
+    float crypto_object, crypto_asset;
+};
+
+struct MaterialView {
+    Program program;
+    float pass_index;
+    float crypto;
+    u32 emission_sampling;  // 0 none, 1 front, 2 back, 3 both
+    u32 transparent_shadows;
+};
+
+enum class PixelFormat : u8 { U8, F16, F32 };
+
+struct ImageView {
+    const void* pixels;  // rows bottom first
+    u32 width, height;
+    u8 channels;         // 1..4
+    PixelFormat format;
+    u8 srgb;             // decode on lookup
+    u8 alpha;            // 0 straight, 1 premultiplied, 2 channel packed, 3 none
+};
+
+struct LightsView;  // light/light.h
+
+struct SceneView {
+    const float* positions;      // 3 per vertex, object space
+    const u32* triangles;        // 3 per triangle, local vertex indices
+    const u16* material_slots;   // per triangle
+    const float* normals;
+    const float* attribute_data;
+    const AttributeView* attributes;
+    const MeshView* meshes;
+    const InstanceView* instances;
+    const ObjectView* objects;
+    const u32* material_table;
+    const MaterialView* materials;
+    const ImageView* images;
+    const Instruction* instructions;
+    const u32* operands;         // outputs, inputs, params of every instruction
+    const float* constants;
+    const float* tables;
+    const LightsView* lights;
+    u32 mesh_count, instance_count, object_count, material_count, image_count, light_count;
+    u32 uv_attribute, color_attribute, generated_attribute, tangent_attribute;  // ids of the defaults
+    Program world_program;
+    Affine world_to_camera;      // Texture Coordinate > Camera/Window, Camera Data
+    Vec3 camera_position;
+};
+
+}  // namespace luch

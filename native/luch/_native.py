@@ -1,0 +1,43 @@
+"""Chooses the compiled core for this processor: AVX-512 (v4), AVX2 (v3) or plain x86-64 (v2).
+
+``LUCH_ISA=v2|v3|v4`` in the environment overrides the choice.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from types import ModuleType
+
+_NEEDS = {
+    "v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
+    "v3": {"avx2", "bmi1", "bmi2", "fma", "f16c", "movbe"},
+    "v2": set[str](),
+}
+
+
+def _processor_flags() -> set[str]:
+    try:
+        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as info:
+            for line in info:
+                if line.startswith("flags"):
+                    return set(line.split(":", 1)[1].split())
+    except OSError:  # not Linux: only the plain module can be trusted
+        return set()
+    return set()
+
+
+def _load() -> ModuleType:
+    wished = os.environ.get("LUCH_ISA")
+    flags = _processor_flags()
+    levels = [wished] if wished else [isa for isa, needs in _NEEDS.items() if needs <= flags]
+    errors = []
+    for isa in levels:
+        try:
+            return importlib.import_module(f"luch._core_{isa}")
+        except ImportError as error:
+            errors.append(f"_core_{isa}: {error}")
+    raise ImportError("Luch's compiled core is missing; run `python3 build.py build`. " + "; ".join(errors))
+
+
+core = _load()

@@ -1,0 +1,237 @@
+"""The scene: plain dataclasses of arrays, what every exporter makes and every backend reads.
+
+Nothing here knows Blender. Spaces: *object* is a mesh's own space, *world* is Blender's world minus
+``Scene.origin`` (subtracted in double, so that far-away scenes keep their digits). Lengths are metres,
+angles radians, colours scene-linear Rec.709. Matrices are rows of a 3x4 affine (float64).
+``luch.scenefile`` writes a scene to one ``.luch`` file and reads it back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+U32 = NDArray[np.uint32]
+
+
+def _identity() -> F64:
+    return np.eye(3, 4)
+
+
+@dataclass
+class Attribute:
+    """A named value on a mesh: float32 (n, channels 1..4), one row per element of its domain."""
+
+    data: F32
+    domain: str  # "POINT" (V rows), "CORNER" (3T rows), "FACE" (T rows), "MESH" (1 row)
+
+
+@dataclass
+class Mesh:
+    """Triangles in object space."""
+
+    name: str
+    positions: F32  # (V, 3)
+    triangles: U32  # (T, 3)
+    material_slots: NDArray[np.uint16]  # (T,)
+    normals: F32 | None = None  # (V, 3) or (3T, 3) unit; None: every face is flat
+    normals_domain: str = "NONE"  # "NONE", "POINT", "CORNER"
+    attributes: dict[str, Attribute] = field(default_factory=dict)
+    uv_active: str = ""  # attribute that Texture Coordinate > UV and an unnamed UV Map give
+    color_active: str = ""  # attribute that an unnamed Color Attribute gives
+    # Blender's texture space: generated = (p - location) / size / 2 + 1/2. An attribute named
+    # "generated" (undeformed coordinates, already in 0..1) wins where it exists.
+    texture_location: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    texture_size: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass
+class Object:
+    """What instances of one Blender object share."""
+
+    name: str
+    mesh: int  # index into Scene.meshes
+    materials: list[int]  # slot -> index into Scene.materials (an empty slot: the default material)
+    pass_index: int = 0
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    visibility: int = 63  # RayKind bits: camera 1, diffuse 2, glossy 4, transmission 8, volume 16, shadow 32
+    holdout: bool = False
+    shadow_catcher: bool = False
+    lightgroup: str = ""
+    asset: str = ""  # name for Cryptomatte Asset (the top of the parent chain)
+
+
+@dataclass
+class Instances:
+    """One row per instance; N rows in every array."""
+
+    object: U32  # (N,) index into Scene.objects
+    matrix: F64  # (N, 3, 4) object to world, before Scene.origin is subtracted
+    random: F32  # (N,) Object Info > Random, 0..1
+    generated: F32  # (N, 3) instancer's generated coordinates
+    uv: F32  # (N, 2) instancer's UV
+
+
+@dataclass
+class Program:
+    """A shader program (see native/include/luch/shade/op.h), made by luch.shader.ProgramBuilder."""
+
+    code: U32  # per instruction: op, param count, outputs, inputs, params
+    constants: F32  # the first registers
+    register_count: int
+    flags: int  # ProgramFlag
+    tables: F32  # ramps and curves; params hold offsets into it
+    images: list[int]  # image slot of the program -> index into Scene.images
+    attributes: list[str]  # attribute slot of the program -> attribute name
+    aovs: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Material:
+    name: str
+    surface: Program
+    pass_index: int = 0
+    emission_sampling: str = "AUTO"  # "NONE", "AUTO", "FRONT", "BACK", "FRONT_BACK"
+    transparent_shadows: bool = True
+    emission_estimate: tuple[float, float, float] = (0.0, 0.0, 0.0)  # typical radiance, for choosing lights
+
+
+@dataclass
+class Image:
+    """Pixels, bottom row first. uint8 is sRGB-encoded or raw as colorspace says; float is scene-linear."""
+
+    name: str
+    pixels: NDArray[np.uint8] | NDArray[np.float16] | F32  # (H, W, 1..4)
+    colorspace: str = "LINEAR"  # "LINEAR" (also Non-Color) or "SRGB"
+    alpha: str = "STRAIGHT"  # "STRAIGHT", "PREMULTIPLIED", "CHANNEL_PACKED", "NONE"
+
+
+@dataclass
+class Light:
+    """A lamp in Blender's terms; strength as Blender states it (W; sun W/m2)."""
+
+    name: str
+    kind: str  # "POINT", "SPOT", "SUN", "AREA"
+    matrix: F64 = field(default_factory=_identity)  # (3, 4), shines along -Z
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)  # colour x temperature x 2^exposure
+    power: float = 10.0
+    normalize: bool = True  # False: power is not divided by the area
+    radius: float = 0.0  # point and spot, metres
+    soft_falloff: bool = True
+    spot_size: float = 0.785398  # full cone angle
+    spot_blend: float = 0.15
+    angle: float = 0.0  # sun, angular diameter
+    shape: str = "SQUARE"  # area: "SQUARE", "RECTANGLE", "DISK", "ELLIPSE"
+    size: float = 0.25
+    size_y: float = 0.25
+    spread: float = 3.14159265
+    program: Program | None = None  # emission of the lamp's node tree; None: constant 1
+    visibility: int = 62  # RayKind bits that see the lamp itself (camera off by default)
+    cast_shadow: bool = True
+    use_mis: bool = True
+    max_bounces: int = 1024
+    lightgroup: str = ""
+    random: float = 0.0
+
+
+@dataclass
+class World:
+    name: str
+    program: Program
+    visibility: int = 63
+    sampling: str = "AUTOMATIC"  # importance map: "NONE", "AUTOMATIC", "MANUAL"
+    map_resolution: int = 1024
+    max_bounces: int = 1024
+    lightgroup: str = ""
+
+
+@dataclass
+class Camera:
+    kind: str = "PERSP"  # "PERSP", "ORTHO", "EQUIRECTANGULAR"
+    matrix: F64 = field(default_factory=_identity)  # (3, 4) camera to world, looks along -Z, Y up
+    lens_mm: float = 50.0
+    sensor_width_mm: float = 36.0
+    sensor_height_mm: float = 24.0
+    sensor_fit: str = "AUTO"  # "AUTO", "HORIZONTAL", "VERTICAL"
+    ortho_scale: float = 6.0
+    shift_x: float = 0.0
+    shift_y: float = 0.0
+    clip_start: float = 0.1
+    clip_end: float = 1000.0
+    use_dof: bool = False
+    focus_distance: float = 10.0
+    fstop: float = 2.8
+    blades: int = 0
+    blades_rotation: float = 0.0
+    aperture_ratio: float = 1.0
+    latitude: tuple[float, float] = (-1.5707964, 1.5707964)
+    longitude: tuple[float, float] = (-3.1415927, 3.1415927)
+
+
+@dataclass
+class Film:
+    width: int = 1920  # full frame, pixels (after resolution percentage)
+    height: int = 1080
+    border: tuple[int, int, int, int] | None = None  # x0, y0, x1, y1 in pixels, bottom left origin
+    pixel_aspect: tuple[float, float] = (1.0, 1.0)
+    filter: str = "BLACKMAN_HARRIS"  # "BOX", "GAUSSIAN", "BLACKMAN_HARRIS"
+    filter_width: float = 1.5
+    exposure: float = 1.0
+    transparent: bool = False
+    transparent_glass: bool = False
+    transparent_roughness: float = 0.1
+    alpha_threshold: float = 0.5  # of data passes through transparency
+    mist: tuple[float, float, str] = (0.0, 25.0, "QUADRATIC")  # start, depth, falloff
+    passes: list[str] = field(default_factory=lambda: ["Combined"])  # Blender's pass names
+    cryptomatte_depth: int = 6
+    lightgroups: list[str] = field(default_factory=list)
+    aovs: list[tuple[str, str]] = field(default_factory=list)  # (name, "COLOR" or "VALUE")
+
+
+@dataclass
+class Settings:
+    """What trades accuracy for time. Defaults take nothing away from the light."""
+
+    samples: int = 128
+    time_limit: float = 0.0  # seconds, 0: none
+    seed: int = 0
+    threads: int = 0  # 0: all
+    max_bounces: int = 12
+    diffuse_bounces: int = 4
+    glossy_bounces: int = 4
+    transmission_bounces: int = 12
+    transparent_bounces: int = 8
+    min_light_bounces: int = 0
+    min_transparent_bounces: int = 0
+    clamp_direct: float = 0.0
+    clamp_indirect: float = 0.0
+    filter_glossy: float = 0.0
+    caustics_reflective: bool = True
+    caustics_refractive: bool = True
+    light_tree: bool = True
+    light_sampling_threshold: float = 0.01
+    accelerator: str = "AUTO"
+    integrator: str = "PATH"
+    ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
+
+
+@dataclass
+class Scene:
+    name: str = "Scene"
+    meshes: list[Mesh] = field(default_factory=list)
+    objects: list[Object] = field(default_factory=list)
+    instances: Instances | None = None
+    materials: list[Material] = field(default_factory=list)
+    images: list[Image] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    world: World | None = None
+    camera: Camera = field(default_factory=Camera)
+    film: Film = field(default_factory=Film)
+    settings: Settings = field(default_factory=Settings)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # subtracted from every position in double
+    frame: int = 1
+    warnings: list[str] = field(default_factory=list)  # one sentence each: object, fact, remedy
