@@ -22,13 +22,6 @@ namespace luch {
 
 struct SceneView;  // shade/scene_view.h: plain pointers to the scene's arrays
 
-struct OpContext {
-    const SceneView* scene;
-    const ShadePoints* points;
-    int lane;              // which of points
-    ClosureSet* closures;  // of this lane; null when only values are wanted
-};
-
 struct Instruction {
     u16 op;            // index into the closed list
     u16 param_count;
@@ -39,7 +32,21 @@ struct Program {
     u32 first_instruction, instruction_count;  // into SceneView::instructions
     u32 register_count;
     u32 first_constant, constant_count;        // SceneView::constants: registers [0, constant_count) hold them
+    // A program's own slots (params) are relative to these; see table_of, image_of, attribute_of, aov_of.
+    u32 first_table;      // SceneView::tables, floats
+    u32 first_image;      // SceneView::program_images
+    u32 first_attribute;  // SceneView::program_attributes
+    u32 first_aov;        // SceneView::program_aovs
     u32 flags;                                 // ProgramFlag
+};
+
+struct OpContext {
+    const SceneView* scene;
+    const Program* program;
+    const ShadePoints* points;
+    int lane;              // which of points
+    ClosureSet* closures;  // of this lane; null when only values are wanted
+    float* aovs;           // of this lane: 4 floats per AOV of the film; null when not wanted
 };
 
 enum ProgramFlag : u32 {

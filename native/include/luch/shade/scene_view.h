@@ -83,6 +83,9 @@ struct SceneView {
     const u32* operands;         // outputs, inputs, params of every instruction
     const float* constants;
     const float* tables;
+    const u32* program_images;      // image slot of a program -> image index
+    const u32* program_attributes;  // attribute slot of a program -> attribute id
+    const u32* program_aovs;        // AOV slot of a program -> AOV index of the film, NONE: not kept
     const LightsView* lights;
     u32 mesh_count, instance_count, object_count, material_count, image_count, light_count;
     u32 uv_attribute, color_attribute, generated_attribute, tangent_attribute;  // ids of the defaults
@@ -90,5 +93,18 @@ struct SceneView {
     Affine world_to_camera;      // Texture Coordinate > Camera/Window, Camera Data
     Vec3 camera_position;
 };
+
+LUCH_FN const float* table_of(const OpContext& c, u32 offset) {
+    return c.scene->tables + c.program->first_table + offset;
+}
+LUCH_FN const ImageView& image_of(const OpContext& c, u32 slot) {
+    return c.scene->images[c.scene->program_images[c.program->first_image + slot]];
+}
+LUCH_FN u32 attribute_of(const OpContext& c, u32 slot) {
+    return c.scene->program_attributes[c.program->first_attribute + slot];
+}
+LUCH_FN u32 aov_of(const OpContext& c, u32 slot) {
+    return c.scene->program_aovs[c.program->first_aov + slot];
+}
 
 }  // namespace luch
