@@ -7,5 +7,6 @@ namespace luch::bindings {
 namespace py = pybind11;
 
 void bind_math(py::module_& m);
+void bind_sampling(py::module_& m);
 
 }  // namespace luch::bindings
