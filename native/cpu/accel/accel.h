@@ -1,0 +1,45 @@
+// The scene as rays see it: a BVH per mesh, a top level over instances. Hits do not depend on the
+// structure: the smallest t in (t_min, t_max]; on equal t the smaller (instance, prim).
+#pragma once
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "cpu/thread_pool.h"
+#include "luch/geometry/ray.h"
+#include "luch/shade/scene_view.h"
+
+namespace luch::cpu {
+
+struct AccelStats {
+    u64 triangles = 0;          // kept, counted once per mesh (once per instance where meshes are merged)
+    u64 nodes = 0, leaf_blocks = 0;
+    u64 bytes = 0;              // nodes, leaf blocks and tables
+    u64 dropped_triangles = 0;  // a vertex is not finite or its index lies outside the mesh
+    double build_seconds = 0.0;
+};
+
+enum class AccelKind { BVH, BRUTE_FORCE };
+enum TriangleFlag : u8 { TRIANGLE_MAY_BE_TRANSPARENT = 1 };
+enum Blocked : u8 { BLOCKED_NOT = 0, BLOCKED_OPAQUE = 1, BLOCKED_MAYBE = 2 };
+
+class Accel {
+  public:
+    // triangle_flags: per mesh, per triangle TriangleFlag bits; empty, or an empty list: all opaque.
+    // The scene's arrays are copied: the view may go away afterwards, the instances too.
+    static std::unique_ptr<Accel> build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
+                                        ThreadPool& pool, AccelKind kind = AccelKind::BVH);
+    virtual ~Accel() = default;
+
+    // Ray i sees the instances whose visibility shares a bit with ray_kinds[i]; null: all of them.
+    // A ray with a non-finite origin or direction, a zero direction or a NaN interval misses.
+    virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const = 0;
+
+    // blocked[i]: BLOCKED_OPAQUE if an opaque triangle lies in the interval, else BLOCKED_MAYBE if one that
+    // may be transparent does (walk them with closest), else BLOCKED_NOT.
+    virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const = 0;
+
+    virtual AccelStats stats() const = 0;
+};
+
+}  // namespace luch::cpu
