@@ -9,15 +9,16 @@ enum class EmitterKind : u8 { NONE_, LAMP, TRIANGLE, WORLD };
 
 struct LightSample {
     EmitterKind kind;     // NONE_: nothing can be sampled from here
-    bool delta;           // point of no size or sun of no angle: a BSDF ray cannot find it
+    bool delta;           // point of no size, sun of no angle, area light of no spread
+    bool mis;             // a BSDF ray may find this emitter too; false (always for delta): weight 1
     Vec3 direction;       // unit, from the shaded point to the light
     float distance;       // metres; INFINITE_DISTANCE for suns and the world
     float pdf_sa;         // for a delta light the probability of choosing it
     Color radiance;       // what the program's emission multiplies: a lamp's radiance (for a delta light
                           // its irradiance at normal incidence), 1 for triangles and the world
-    u32 lamp;             // LAMP: index into SceneView::lights
+    u32 lamp;             // LAMP: index into LightsView::lamps, the scene's own order
     u32 instance, prim;   // TRIANGLE
-    float u, v;           // TRIANGLE: barycentrics; LAMP: its parametric coordinates
+    float u, v;           // TRIANGLE: barycentrics as in Hit; LAMP: what Geometry > Parametric gives
     Vec3 point, normal;   // on the light, world; normal is geometric and faces the shaded point
     u32 visibility;       // RayKind bits that the emitter lights (diffuse, glossy, transmission)
     u32 lightgroup;       // as ObjectView::lightgroup
@@ -32,15 +33,79 @@ struct LampHit {
     Vec3 normal;
 };
 
-// Implemented in the other headers of this room:
+// Implemented in light/sample.h, light/lamp.h, light/tree.h, light/world.h, light/triangle.h:
 //   LightSample sample_light(const SceneView&, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u);
 //     n: shading normal (zero vector inside a volume); transmits: light from behind n counts too.
+//     A caller whose closures have normals of their own (bump per closure) passes transmits = true or n = 0:
+//     emitters wholly behind n are never chosen.
 //   float pdf_triangle(const SceneView&, Vec3 p, Vec3 n, bool transmits, u32 instance, u32 prim,
 //                      Vec3 direction, float distance);   // what sample_light would have had; 0: not a light
 //   float pdf_lamp(const SceneView&, Vec3 p, Vec3 n, bool transmits, const LampHit&, Vec3 direction);
 //   float pdf_world(const SceneView&, Vec3 p, Vec3 n, bool transmits, Vec3 direction);
-//   LampHit closest_lamp(const SceneView&, const Ray&, u32 ray_kind);  // area, sphere, spot lamps of finite size
-//   Color suns_radiance(const SceneView&, Vec3 direction, u32 ray_kind, ...);  // suns with an angle, seen by a ray that leaves the scene
-// Host side (cpu/lights.h): builds LightsView from luch.Scene's lights, emissive triangles and world map.
+//   LampHit closest_lamp(const SceneView&, const Ray&, u32 ray_kind);  // unit direction; lamps of finite size
+//   LampHit sun_hit(const SceneView&, u32 sun, Vec3 direction, u32 ray_kind);  // sun in [0, sun_count):
+//     what a ray that leaves the scene sees of that sun; lamp = NONE outside its disk. pdf_lamp takes it.
+
+enum class LampKind : u8 { SPHERE, DISK, SUN, RECTANGLE, ELLIPSE };  // DISK: soft falloff, faces the shaded point
+
+// A lamp as kernels see it. Lengths in metres, world (camera-relative) space.
+struct LampView {
+    LampKind kind;
+    bool spot;                  // SPHERE and DISK: has a cone
+    bool delta;                 // see LightSample
+    bool mis;                   // BSDF rays may hit it
+    bool cast_shadow;
+    bool has_program;           // program multiplies the radiance
+    Vec3 position;
+    float radius;               // SPHERE, DISK
+    Color radiance;             // of its surface; delta: intensity (W/sr) or, SUN and spread 0, irradiance
+    Vec3 axis_u, axis_v;        // AREA: unit axes in its plane
+    float half_u, half_v;       // AREA: half extents
+    Vec3 direction;             // unit, where a spot, a sun, an area light shines
+    float area;                 // AREA: m2
+    float tan_half_spread;      // AREA: INFINITE_DISTANCE without a spread
+    float spread_scale;         // AREA: 1 / (tan a - a), a the half spread
+    float cos_half_spot, spot_scale;  // smoothstep((z - cos_half_spot) * spot_scale)
+    float half_cot_half_spot;
+    float spot_one_minus_cos;   // 1 - cos of the widest half angle of the cone (a scaled lamp's cone is not round)
+    float cos_half_angle, one_minus_cos_half_angle;  // SUN
+    float to_local[9];          // rows; world direction to the lamp's own axes
+    Program program;
+    float random;
+    u32 visibility, lightgroup;
+    u32 max_bounces;
+    u32 emitter;                // index into LightsView::emitters
+};
+
+struct LightTreeNode;  // light/tree.h
+struct LampBoxNode;    // light/closest_lamp.h
+struct Emitter;        // light/tree.h
+
+struct WorldLight {
+    bool present, constant;
+    Color radiance;             // constant
+    u32 width, height;          // importance map, bilinear between texel centres
+    const float* density;       // height * width: luminance times cos(latitude), normalised: see light/world.h
+    const float* row_cdf;       // height + 2
+    const float* column_cdf;    // (height + 1) * (width + 1)
+    u32 visibility, lightgroup;
+    bool has_sun;               // an extra cone around the sun of a sky texture
+    Vec3 sun_direction;
+    float sun_one_minus_cos, sun_probability;
+};
+
+struct LightsView {
+    const LampView* lamps;
+    const Emitter* emitters;            // local lamps and triangles, in the order of (lamp | instance, prim)
+    const LightTreeNode* nodes;         // nodes[0]: the root
+    const u32* instance_emitters;       // per instance: offset into triangle_emitters; NONE: emits nothing
+    const u32* triangle_emitters;       // emitter of each triangle of such instances; NONE
+    const LampBoxNode* boxes;
+    const u32* suns;                    // lamp indices
+    const float* sun_energy;
+    u32 lamp_count, emitter_count, node_count, box_count, sun_count;
+    bool uniform;                       // light tree off: every emitter is as likely
+    WorldLight world;
+};
 
 }  // namespace luch
