@@ -8,5 +8,6 @@ namespace py = pybind11;
 
 void bind_math(py::module_& m);
 void bind_sampling(py::module_& m);
+void bind_shade(py::module_& m);
 
 }  // namespace luch::bindings

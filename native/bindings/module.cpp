@@ -4,4 +4,5 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     m.doc() = "Luch's native core.";
     luch::bindings::bind_math(m);
     luch::bindings::bind_sampling(m);
+    luch::bindings::bind_shade(m);
 }

@@ -12,7 +12,11 @@
 // variants, table offsets, image slots; floats through bits_float). Value operations are pure and
 // branch-light (a ternary, not an if) so that the loop vectorises. Closure operations have
 // outputs = 0 and append to context.closures; `in[0..2]` is always the closure's weight.
-// An operation is one line in the closed list shade/ops.h: LUCH_OP(NAME, struct).
+// An operation is one line in the closed list shade/ops.inc: LUCH_OP(NAME, struct).
+//
+// Optional facts, as static constexpr members: `params` (how many static words, default 0) and
+// `reads_point = true`: the result depends on more than inputs, params and tables (images, attributes,
+// the point), else the program builder folds the operation when its inputs are constant.
 #pragma once
 #include "luch/bsdf/closure.h"
 #include "luch/math/fn.h"
@@ -47,6 +51,14 @@ struct OpContext {
     int lane;              // which of points
     ClosureSet* closures;  // of this lane; null when only values are wanted
     float* aovs;           // of this lane: 4 floats per AOV of the film; null when not wanted
+};
+
+// Attribute slots that mean a default of the mesh.
+enum AttributeSlot : u32 {
+    ATTRIBUTE_UV = 0xfffffff0u,    // the active UV map
+    ATTRIBUTE_COLOR = 0xfffffff1u, // the active colour attribute
+    ATTRIBUTE_GENERATED = 0xfffffff2u,
+    ATTRIBUTE_TANGENT = 0xfffffff3u,
 };
 
 enum ProgramFlag : u32 {

@@ -92,6 +92,7 @@ struct SceneView {
     Program world_program;
     Affine world_to_camera;      // Texture Coordinate > Camera/Window, Camera Data
     Vec3 camera_position;
+    Vec3 origin;                 // Scene.origin: added to a position it gives Blender's world
 };
 
 LUCH_FN const float* table_of(const OpContext& c, u32 offset) {
@@ -101,6 +102,12 @@ LUCH_FN const ImageView& image_of(const OpContext& c, u32 slot) {
     return c.scene->images[c.scene->program_images[c.program->first_image + slot]];
 }
 LUCH_FN u32 attribute_of(const OpContext& c, u32 slot) {
+    if (slot >= ATTRIBUTE_UV) {
+        return slot == ATTRIBUTE_UV          ? c.scene->uv_attribute
+               : slot == ATTRIBUTE_COLOR     ? c.scene->color_attribute
+               : slot == ATTRIBUTE_GENERATED ? c.scene->generated_attribute
+                                             : c.scene->tangent_attribute;
+    }
     return c.scene->program_attributes[c.program->first_attribute + slot];
 }
 LUCH_FN u32 aov_of(const OpContext& c, u32 slot) {

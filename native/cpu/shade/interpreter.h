@@ -1,0 +1,32 @@
+// Runs a shader program over a chunk of points: one operation at a time, each a loop over the lanes.
+#pragma once
+#include <cstddef>
+
+#include "luch/shade/scene_view.h"
+
+namespace luch::cpu {
+
+// What the world outside may know about an operation.
+struct OpInfo {
+    const char* name;
+    int inputs, outputs, params;  // float registers read and written; static words
+    bool closure;                 // outputs = 0: it appends to the closures (or stores an AOV)
+    bool constant;                // foldable: depends on its inputs and params alone
+};
+
+int op_count();
+const OpInfo& op_info(int op);
+
+// Floats that a program's registers need.
+inline size_t register_floats(const Program& program) { return size_t(program.register_count) * SHADE_LANES; }
+
+// Runs the program for points[0, points.count). closures[points.count] are started empty and filled.
+// registers: scratch of register_floats(program) floats, 64-byte aligned. aovs: null, or
+// points.count rows of aov_stride floats that AOV Output nodes write to.
+void run_program(const SceneView& scene, const Program& program, const ShadePoints& points, ClosureSet* closures,
+                 float* registers, float* aovs = nullptr, size_t aov_stride = 0);
+
+// Computes values only: closure operations are passed over; results stay in their registers.
+void run_values(const SceneView& scene, const Program& program, const ShadePoints& points, float* registers);
+
+}  // namespace luch::cpu
