@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""The one door: sets up, builds, renders, exports, tests, benches, packages.
+
+Any Python from 3.9 may start it. It makes `.venv` with a Python 3.13 (Blender 5.2's own) and everything
+pinned in requirements.txt, compiles native/, and runs the rest there. `build.py COMMAND --help` tells more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from buildtools import commands
+from buildtools.failure import BuildFailure
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="build.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    compiling = argparse.ArgumentParser(add_help=False)
+    compiling.add_argument(
+        "--isa", default="v2;v3;v4", help="x86-64 levels to compile, e.g. v4 or 'v3;v4' (default: all three)"
+    )
+    compiling.add_argument("--jobs", type=int, default=0, help="compiler processes at once (default: one per core)")
+
+    def add(name: str, text: str, *, compiles: bool = True, passes_on: bool = False) -> argparse.ArgumentParser:
+        parents = [compiling] if compiles else []
+        sub = subparsers.add_parser(name, help=text, description=text, parents=parents, allow_abbrev=False)
+        sub.set_defaults(run=getattr(commands, name), passes_on=passes_on)
+        return sub
+
+    add("setup", "Make .venv with the pinned tools; nothing to do when it is there.", compiles=False)
+    build = add("build", "Compile the native core into native/luch.")
+    build.add_argument(
+        "--sanitize", action="store_true", help="with AddressSanitizer and UBSan, in a folder of its own"
+    )
+
+    render = add("render", "Render a .blend file, or the demo scene, with Luch inside Blender.")
+    render.add_argument("file", nargs="?", help="a .blend file (default: the demo scene, built by its script)")
+    render.add_argument("--samples", type=int, help="samples per pixel (default: the file's; the demo: 256)")
+    render.add_argument("--time", type=float, help="stop after this many seconds of rendering")
+    render.add_argument("--seed", type=int, help="seed of the sampler")
+    render.add_argument("--frame", type=int, help="frame to render (default: the file's current one)")
+    render.add_argument("--scale", type=float, help="factor on the resolution, e.g. 0.5")
+    render.add_argument("--output", help="PATH.exr (multilayer) or PATH.png (default: both, under out/)")
+    render.add_argument("--engine", default="LUCH", choices=["LUCH", "CYCLES"], help="for a look beside (default LUCH)")
+
+    export = add("export", "Write a .blend file as a .luch scene, which renders without Blender.")
+    export.add_argument("file", help="a .blend file")
+    export.add_argument("-o", "--output", required=True, help="PATH.luch")
+    export.add_argument("--frame", type=int, help="frame to export (default: the file's current one)")
+
+    add("test", "Run the tests. Other arguments go to pytest, e.g. -k lights.", passes_on=True)
+    bench = add("bench", "Race and compare; other arguments go to the bench. No name: list them.", passes_on=True)
+    bench.add_argument("name", nargs="?", help="a file in tests/bench, without .py")
+    add("check", "The gate of the house: format, lint, spelling, architecture, types, headers.")
+    package = add("package", "Build and validate the extension zip under dist/.")
+    package.add_argument(
+        "--python", default="", help="also build for this Python, e.g. /usr/bin/python3.14 (repeat by ,)"
+    )
+    clean = add("clean", "Remove build products (keeps .venv).", compiles=False)
+    clean.add_argument("--all", action="store_true", help="remove .venv too")
+    return parser
+
+
+def main() -> int:
+    parser = _parser()
+    arguments, rest = parser.parse_known_args()
+    if rest and not arguments.passes_on:
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    arguments.rest = rest
+    try:
+        return int(arguments.run(arguments))
+    except BuildFailure as failure:
+        print(f"build.py {arguments.command}: {failure}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

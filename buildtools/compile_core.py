@@ -1,0 +1,51 @@
+"""Compiles native/ with CMake and ninja, incrementally, into native/luch/_core_*.so."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import List
+
+from buildtools.failure import BuildFailure
+from buildtools.places import BUILD, NATIVE, ROOT, VENV_PYTHON, tool
+from buildtools.run import output, require
+
+SANITIZE_BUILD = ROOT / ".build-sanitize"
+
+
+def compile_core(isas: str = "v2;v3;v4", jobs: int = 0, sanitize: bool = False) -> None:
+    """isas: semicolon-separated x86-64 levels. jobs: 0 means one per core. Raises BuildFailure."""
+    if not (shutil.which("c++") or os.environ.get("CXX")):
+        raise BuildFailure("no C++ compiler found; install one that knows C++20 (e.g. the package g++, 12 or later)")
+    folder = SANITIZE_BUILD if sanitize else BUILD
+    _configure(folder, isas, sanitize)
+    require(
+        [tool("cmake"), "--build", str(folder), "-j", str(jobs or os.cpu_count() or 1)],
+        "the core did not compile; the compiler's first error is above",
+    )
+
+
+def core_options(isas: str, python: str) -> List[str]:
+    """CMake's -D options that decide what is compiled; python: the interpreter it is for."""
+    options = [
+        f"-DLUCH_ISAS={isas}",
+        f"-DPython_EXECUTABLE={python}",
+        f"-Dpybind11_DIR={output([str(VENV_PYTHON), '-m', 'pybind11', '--cmakedir'])}",
+    ]
+    ccache = shutil.which("ccache")
+    return [*options, f"-DCMAKE_CXX_COMPILER_LAUNCHER={ccache}"] if ccache else options
+
+
+def _configure(folder: Path, isas: str, sanitize: bool) -> None:
+    options = core_options(isas, str(VENV_PYTHON))
+    options += [f"-DLUCH_SANITIZE={'ON' if sanitize else 'OFF'}", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}"]
+    record = folder / "luch-options.txt"
+    wanted = "\n".join(options)
+    if (folder / "build.ninja").exists() and record.exists() and record.read_text() == wanted:
+        return  # ninja itself runs CMake again when a CMakeLists.txt or the list of sources changes
+    require(
+        [tool("cmake"), "-S", str(NATIVE), "-B", str(folder), "-G", "Ninja", *options],
+        "CMake could not configure native/",
+    )
+    record.write_text(wanted)

@@ -1,0 +1,1 @@
+"""Runs in .venv, where bpy is. Started by build.py, one job per file."""

@@ -1,0 +1,1 @@
+"""Helpers that tests share: renders as arrays, comparisons that keep their pictures."""
