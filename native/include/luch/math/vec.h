@@ -51,9 +51,7 @@ LUCH_FN Vec3& operator*=(Vec3& a, Vec3 b) { return a = a * b; }
 LUCH_FN Vec3& operator*=(Vec3& a, float s) { return a = a * s; }
 
 LUCH_FN float dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-LUCH_FN Vec3 cross(Vec3 a, Vec3 b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+LUCH_FN Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 LUCH_FN float length_squared(Vec3 a) { return dot(a, a); }
 LUCH_FN float length(Vec3 a) { return sqrt_f(dot(a, a)); }
 LUCH_FN Vec3 normalize(Vec3 a) { return a / length(a); }
@@ -89,8 +87,7 @@ struct Affine {
     float m[12];
 };
 LUCH_FN Vec3 transform_point(const Affine& a, Vec3 p) {
-    return {a.m[0] * p.x + a.m[1] * p.y + a.m[2] * p.z + a.m[3],
-            a.m[4] * p.x + a.m[5] * p.y + a.m[6] * p.z + a.m[7],
+    return {a.m[0] * p.x + a.m[1] * p.y + a.m[2] * p.z + a.m[3], a.m[4] * p.x + a.m[5] * p.y + a.m[6] * p.z + a.m[7],
             a.m[8] * p.x + a.m[9] * p.y + a.m[10] * p.z + a.m[11]};
 }
 LUCH_FN Vec3 transform_direction(const Affine& a, Vec3 v) {
