@@ -27,15 +27,25 @@ enum LobeClass : u8 { CLASS_DIFFUSE = 0, CLASS_GLOSSY = 1, CLASS_TRANSMISSION = 
 // How a microfacet lobe reflects; the parameters lie in Lobe::c0, c1, c2, ior.
 enum class Fresnel : u8 { NONE_, DIELECTRIC, CONDUCTOR, F82_TINT, GENERALIZED_SCHLICK };
 
+enum class Distribution : u8 { GGX, BECKMANN };
+
+enum LobeFlag : u8 {
+    // The lobe is a reflection seen through the surface: directions meet it mirrored at the surface
+    // and its normal points to the far side (thin walls).
+    LOBE_MIRRORED = 1u,
+    LOBE_BUMPED = 2u,     // normal is not the interpolated one: light leaks must be tested for
+    LOBE_SOFTENED = 4u,   // bumped diffuse lobe whose terminator is softened
+};
+
 struct Lobe {
     LobeType type;
     Fresnel fresnel;
-    u8 distribution;      // 0 GGX, 1 Beckmann, 2 GGX with multiple-scattering compensation
-    u8 flags;             // lobe specific
+    Distribution distribution;
+    u8 flags;             // LobeFlag
     float sample_weight;  // relative probability of being chosen; > 0
     Color weight;         // multiplies the lobe
     Vec3 normal;          // unit
-    Vec3 tangent;         // unit, only for anisotropy
+    Vec3 tangent;         // unit, perpendicular to normal; only for anisotropy and sheen
     float alpha_x, alpha_y;  // roughness squared, or the model's own
     float ior;
     float extra;          // lobe specific
@@ -48,6 +58,7 @@ struct ClosureSet {
     int count;
     Color emission;     // W m^-2 sr^-1, sum of emission closures
     Color transparent;  // straight-through transmission, sum of Transparent closures
+    Vec3 n_smooth;      // interpolated normal before bump, set with every lobe
     float holdout;      // weight of Holdout closures
     Lobe lobes[MAX_LOBES];
 };

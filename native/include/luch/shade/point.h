@@ -1,28 +1,13 @@
 // What a shader program can ask about the point it shades. Structure of arrays: one chunk of
 // SHADE_LANES points that share a program, so that each operation is one tight loop.
 #pragma once
+#include "luch/bsdf/path_flag.h"
 #include "luch/math/vec.h"
 
 namespace luch {
 
 // 64 lanes: 64 float registers of 64 lanes are 16 KiB, half of a first-level cache.
 inline constexpr int SHADE_LANES = LUCH_CUDA ? 1 : 64;
-
-// Path facts for the Light Path node and for closures (caustics switches).
-enum PathFlag : u32 {
-    PATH_CAMERA = 1u,
-    PATH_SHADOW = 2u,
-    PATH_DIFFUSE = 4u,
-    PATH_GLOSSY = 8u,       // includes singular
-    PATH_SINGULAR = 16u,    // the last bounce was a delta lobe
-    PATH_REFLECT = 32u,
-    PATH_TRANSMIT = 64u,    // the last bounce went through a surface (not transparent)
-    PATH_VOLUME = 128u,
-    PATH_EMISSION_ONLY = 256u,  // the program runs for its emission alone (light sampling)
-    PATH_BACKFACING = 512u,     // the ray meets the surface from behind
-    PATH_TRANSPARENT_ONLY = 1024u,  // the program runs for its transparency alone (shadow rays)
-    PATH_DIFFUSE_ANCESTOR = 2048u,  // a diffuse bounce lies somewhere before (caustics switches)
-};
 
 struct alignas(64) ShadePoints {
     int count;

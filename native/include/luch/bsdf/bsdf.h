@@ -1,0 +1,160 @@
+// The list of lobes as the integrator sees it: evaluate, sample, blur, and what the passes show.
+#pragma once
+#include "luch/bsdf/bump_shadow.h"
+#include "luch/bsdf/diffuse.h"
+
+namespace luch {
+
+LUCH_FN Vec3 mirrored_at(Vec3 w, Vec3 n) { return w - n * (2.0f * dot(w, n)); }
+
+LUCH_FN bool is_diffuse(LobeType t) { return t <= LobeType::SHEEN; }
+
+// A lobe's light counts by its kind and, for glass, by the side it leaves on.
+LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
+    switch (lobe.type) {
+        case LobeType::DIFFUSE:
+        case LobeType::OREN_NAYAR:
+        case LobeType::TRANSLUCENT:
+        case LobeType::SHEEN: return CLASS_DIFFUSE;
+        case LobeType::MICROFACET_REFRACTION: return CLASS_TRANSMISSION;
+        case LobeType::MICROFACET_GLASS: return dot(lobe.normal, wi) > 0.0f ? CLASS_GLOSSY : CLASS_TRANSMISSION;
+        default: return lobe.flags & LOBE_MIRRORED ? CLASS_TRANSMISSION : CLASS_GLOSSY;
+    }
+}
+
+LUCH_FN void add_to_class(BsdfValue& value, LobeClass which, Color light) {
+    Color& sum = which == CLASS_DIFFUSE ? value.diffuse : (which == CLASS_GLOSSY ? value.glossy : value.transmission);
+    sum += light;
+}
+
+LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
+    switch (lobe.type) {
+        case LobeType::DIFFUSE: return eval_diffuse(lobe, wi);
+        case LobeType::OREN_NAYAR: return eval_oren_nayar(lobe, wo, wi);
+        case LobeType::TRANSLUCENT: return eval_translucent(lobe, wi);
+        default: return {make_vec3(0.0f), 0.0f};
+    }
+}
+
+LUCH_FN LobeValue eval_lobe(const Lobe& lobe, Vec3 n_smooth, Vec3 wo, Vec3 wi) {
+    Vec3 seen_from = lobe.flags & LOBE_MIRRORED ? mirrored_at(wo, lobe.normal) : wo;
+    LobeValue value = eval_lobe_unshadowed(lobe, seen_from, wi);
+    if (lobe.flags & LOBE_BUMPED) value.f *= bump_shadow(lobe, is_diffuse(lobe.type), n_smooth, wi, true);
+    return value;
+}
+
+// Light scattered from wi to wo per class, times |cos|; the density of sample_closures choosing wi.
+LUCH_FN_SLOW BsdfValue eval_closures(const ClosureSet& set, Vec3 /*n_geometric*/, Vec3 wo, Vec3 wi, float* pdf_sa) {
+    BsdfValue value = {};
+    float pdf_sum = 0.0f, weight_sum = 0.0f;
+    for (int i = 0; i < set.count; ++i) {
+        const Lobe& lobe = set.lobes[i];
+        weight_sum += lobe.sample_weight;
+        LobeValue v = eval_lobe(lobe, set.n_smooth, wo, wi);
+        if (!(v.pdf_sa > 0.0f)) continue;
+        add_to_class(value, lobe_class(lobe, wi), v.f * lobe.weight);
+        pdf_sum += v.pdf_sa * lobe.sample_weight;
+    }
+    *pdf_sa = weight_sum > 0.0f ? pdf_sum / weight_sum : 0.0f;
+    return value;
+}
+
+// One lobe's draw, before the others are asked what they think of its direction.
+struct LobeSample {
+    Vec3 direction;
+    Color f;        // f |cos| without the lobe's weight; for a delta lobe the fraction of light
+    float pdf_sa;   // for a delta lobe the probability; 0: no sample
+    float roughness, eta;
+    bool delta, transmitted;
+};
+
+LUCH_FN LobeSample sample_lobe(const Lobe& lobe, Vec3 n_geometric, Vec3 wo, float /*u_side*/, Vec2 u) {
+    LobeSample s = {};
+    s.eta = s.roughness = 1.0f;
+    bool through = lobe.type == LobeType::TRANSLUCENT;
+    s.transmitted = through || (lobe.flags & LOBE_MIRRORED);
+    Vec3 outside = lobe.flags & LOBE_MIRRORED ? -n_geometric : n_geometric;
+    s.direction = sample_cosine_around(through ? -lobe.normal : lobe.normal, u);
+    if ((dot(outside, s.direction) > 0.0f) == through) return s;
+    LobeValue v = eval_lobe_unshadowed(lobe, wo, s.direction);
+    s.f = v.f;
+    s.pdf_sa = v.pdf_sa;
+    return s;
+}
+
+// Chooses a lobe by its sample weight; *u becomes a fresh number in [0, 1).
+LUCH_FN int choose_lobe(const ClosureSet& set, float weight_sum, float* u) {
+    float r = *u * weight_sum, before = 0.0f;
+    int i = 0;
+    for (; i < set.count - 1; ++i) {
+        float after = before + set.lobes[i].sample_weight;
+        if (r < after) break;
+        before = after;
+    }
+    *u = clamp_f((r - before) / set.lobes[i].sample_weight, 0.0f, 0.99999994f);
+    return i;
+}
+
+LUCH_FN_SLOW BsdfSample sample_closures(const ClosureSet& set, Vec3 n_geometric, Vec3 wo, float u_lobe, Vec2 u) {
+    BsdfSample out = {};
+    if (set.count == 0) return out;
+    float weight_sum = 0.0f;
+    for (int i = 0; i < set.count; ++i) weight_sum += set.lobes[i].sample_weight;
+    int chosen = set.count > 1 ? choose_lobe(set, weight_sum, &u_lobe) : 0;
+    const Lobe& lobe = set.lobes[chosen];
+    Vec3 seen_from = lobe.flags & LOBE_MIRRORED ? mirrored_at(wo, lobe.normal) : wo;
+    LobeSample s = sample_lobe(lobe, n_geometric, seen_from, u_lobe, u);
+    if (!(s.pdf_sa > 0.0f)) return out;
+    if ((lobe.flags & LOBE_BUMPED) && !s.transmitted)
+        s.f *= bump_shadow(lobe, is_diffuse(lobe.type), set.n_smooth, s.direction, false);
+    out.direction = s.direction;
+    out.roughness = s.roughness;
+    out.eta = s.eta;
+    out.transmitted = s.transmitted;
+    out.lobe_class = lobe_class(lobe, s.direction);
+    if (s.delta) {
+        out.delta = true;
+        out.pdf_sa = 1.0f;
+        out.throughput = s.f * lobe.weight * (weight_sum / (s.pdf_sa * lobe.sample_weight));
+        return out;
+    }
+    add_to_class(out.value, out.lobe_class, s.f * lobe.weight);
+    float pdf_sum = s.pdf_sa * lobe.sample_weight;
+    for (int i = 0; i < set.count; ++i) {
+        if (i == chosen) continue;
+        const Lobe& other = set.lobes[i];
+        LobeValue v = eval_lobe(other, set.n_smooth, wo, s.direction);
+        if (!(v.pdf_sa > 0.0f)) continue;
+        add_to_class(out.value, lobe_class(other, s.direction), v.f * other.weight);
+        pdf_sum += v.pdf_sa * other.sample_weight;
+    }
+    out.pdf_sa = pdf_sum / weight_sum;
+    out.throughput = total(out.value) / out.pdf_sa;
+    return out;
+}
+
+// Filter Glossy: no lobe is sharper than `roughness` (alpha) after a blurring bounce.
+LUCH_FN void blur_closures(ClosureSet& set, float roughness) {
+    for (int i = 0; i < set.count; ++i) {
+        Lobe& lobe = set.lobes[i];
+        if (lobe.type < LobeType::MICROFACET_REFLECTION) continue;
+        lobe.alpha_x = max_f(lobe.alpha_x, roughness);
+        lobe.alpha_y = max_f(lobe.alpha_y, roughness);
+    }
+}
+
+// What the lobes reflect and transmit of a white surrounding: the Color passes.
+LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 /*wo*/) {
+    BsdfValue value = {};
+    for (int i = 0; i < set.count; ++i) value.diffuse += set.lobes[i].weight;
+    return value;
+}
+
+// Mean normal of the lobes by weight: the Denoising Normal pass.
+LUCH_FN Vec3 shading_normal(const ClosureSet& set, Vec3 fallback) {
+    Vec3 sum = make_vec3(0.0f);
+    for (int i = 0; i < set.count; ++i) sum += set.lobes[i].normal * average(set.lobes[i].weight);
+    return normalize_or(sum, fallback);
+}
+
+}  // namespace luch
