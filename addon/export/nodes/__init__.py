@@ -1,0 +1,96 @@
+"""Node trees to shader programs: ``compile_material``, ``compile_world``, ``compile_light``.
+
+Blender's own inliner (InlineShaderNodes) flattens groups, reroutes, mutes and zones; then the tree is
+walked from its output (tree.py) and each node is emitted by its family (see FAMILIES). To add a node,
+write an emitter in its family's file; to add a family, write a file and add its name to FAMILIES.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+from luch import scene
+from luch.shader import ProgramBuilder
+
+from .tree import Compiler, Context
+
+FAMILIES = ("inputs", "closures")
+for _family in FAMILIES:
+    importlib.import_module(f".{_family}", __name__)
+
+__all__ = ["Context", "compile_light", "compile_material", "compile_world", "default_material"]
+
+_SAMPLING = {"NONE": "NONE", "AUTO": "AUTO", "FRONT": "FRONT", "BACK": "BACK", "FRONT_BACK": "FRONT_BACK"}
+
+
+def compile_material(material: bpy.types.Material | None, context: Context) -> scene.Material:
+    """Surface program and settings of a material. Without an output node it is black, as in Cycles."""
+    if material is None or material.node_tree is None:
+        return default_material(material.name if material else "Default")
+    owner = f'Material "{material.name}"'
+    inlined = bpy.types.InlineShaderNodes.from_material(material)
+    compiler = Compiler(inlined.node_tree, owner, context)
+    _emit_surface(compiler)
+    estimate = compiler.builder.emission() or compiler.builder.emission_bound()
+    settings = getattr(material, "cycles", None)
+    return scene.Material(
+        name=material.name,
+        surface=compiler.builder.finish(),
+        pass_index=material.pass_index,
+        emission_sampling=_SAMPLING.get(getattr(settings, "emission_sampling", "AUTO"), "AUTO"),
+        transparent_shadows=bool(getattr(material, "use_transparent_shadow", True)),
+        emission_estimate=estimate,
+    )
+
+
+def default_material(name: str = "Default") -> scene.Material:
+    """What Blender shows where a slot is empty: grey diffuse of 0.8."""
+    builder = ProgramBuilder()
+    return scene.Material(name=name, surface=builder.finish())
+
+
+def compile_world(world: bpy.types.World, context: Context) -> scene.Program:
+    """Emission program of a world. The point is a direction."""
+    owner = f'World "{world.name}"'
+    if world.node_tree is None:
+        builder = ProgramBuilder()
+        builder.closure("CLOSURE_EMISSION", builder.vector(*world.color))
+        return builder.finish()
+    inlined = bpy.types.InlineShaderNodes.from_world(world)
+    compiler = Compiler(inlined.node_tree, owner, context)
+    _emit_surface(compiler)
+    return compiler.builder.finish()
+
+
+def compile_light(light: bpy.types.Light, context: Context) -> scene.Program | None:
+    """Emission program of a lamp, times which its colour and power shine; None: it has no nodes."""
+    if light.node_tree is None or not light.use_nodes:
+        return None
+    inlined = bpy.types.InlineShaderNodes.from_light(light)
+    compiler = Compiler(inlined.node_tree, f'Light "{light.name}"', context)
+    _emit_surface(compiler)
+    return compiler.builder.finish()
+
+
+def _emit_surface(compiler: Compiler) -> None:
+    output = compiler.tree.get_output_node("CYCLES")
+    if output is None:
+        return
+    one = compiler.builder.vector(1.0, 1.0, 1.0)
+    with _deep_trees():
+        compiler.closure(output, "Surface", one)
+
+
+@contextmanager
+def _deep_trees() -> Iterator[None]:
+    """Chains of hundreds of nodes are walked recursively."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, 50_000))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)
