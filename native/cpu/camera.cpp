@@ -1,0 +1,144 @@
+#include "cpu/camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace luch::cpu {
+namespace {
+
+// The side of the frame that the sensor (or the orthographic scale) spans, which is also the unit of
+// shift: its half length on a plane one metre away (orthographic: in metres) and its pixels' count.
+struct Fit {
+    double half_length;
+    double pixels_x, pixels_y;  // pixels along either axis that make that length
+};
+
+Fit fit_sensor(const CameraSpec& camera, const FrameSpec& frame, CameraKind kind) {
+    double aspect = frame.pixel_aspect[0] / frame.pixel_aspect[1];
+    bool wide = frame.width * aspect > frame.height;
+    bool horizontal = camera.sensor_fit == "HORIZONTAL" || (camera.sensor_fit == "AUTO" && wide);
+    double sensor = camera.sensor_fit == "VERTICAL" ? camera.sensor_height_mm : camera.sensor_width_mm;
+    double half = kind == CameraKind::ORTHOGRAPHIC ? 0.5 * camera.ortho_scale
+                                                   : 0.5 * sensor / std::max(camera.lens_mm, 1e-9);
+    if (horizontal) return {half, static_cast<double>(frame.width), frame.width * aspect};
+    return {half, frame.height / aspect, static_cast<double>(frame.height)};
+}
+
+void set_raster_map(CameraView& view, const CameraSpec& camera, const FrameSpec& frame) {
+    double cx, cy, sx, sy;  // plane = (raster - centre) * scale
+    if (view.kind == CameraKind::EQUIRECTANGULAR) {
+        // Kept from 0, which would leave no place for the centre.
+        sx = std::min(camera.longitude[0] - camera.longitude[1], -1e-9) / frame.width;
+        sy = std::min(camera.latitude[0] - camera.latitude[1], -1e-9) / frame.height;
+        cx = camera.longitude[0] / sx - camera.shift_x * frame.width;
+        cy = (camera.latitude[0] - 1.5707963267948966) / sy - camera.shift_y * frame.height;
+    } else {
+        Fit fit = fit_sensor(camera, frame, view.kind);
+        sx = 2.0 * fit.half_length / fit.pixels_x;
+        sy = 2.0 * fit.half_length / fit.pixels_y;
+        cx = 0.5 * frame.width - camera.shift_x * fit.pixels_x;
+        cy = 0.5 * frame.height - camera.shift_y * fit.pixels_y;
+    }
+    view.centre = {static_cast<float>(cx), static_cast<float>(cy)};
+    view.scale = {static_cast<float>(sx), static_cast<float>(sy)};
+}
+
+// Blender's camera axes without their scale, turned into camera space. A collapsed axis (an object
+// scaled to 0) is rebuilt from the other two.
+void set_transforms(CameraView& view, const CameraSpec& camera, const double origin[3]) {
+    double axis[3][3];
+    for (int k = 0; k < 3; ++k) {
+        double x = camera.matrix[k], y = camera.matrix[4 + k], z = camera.matrix[8 + k];
+        double length = std::hypot(x, y, z);
+        bool valid = length > 1e-150 && std::isfinite(length);
+        axis[k][0] = valid ? x / length : (k == 0);
+        axis[k][1] = valid ? y / length : (k == 1);
+        axis[k][2] = valid ? z / length : (k == 2);
+    }
+    bool panorama = view.kind == CameraKind::EQUIRECTANGULAR;
+    double m[12];
+    for (int row = 0; row < 3; ++row) {
+        double right = axis[0][row], up = axis[1][row], forward = -axis[2][row];
+        m[4 * row + 0] = panorama ? forward : right;
+        m[4 * row + 1] = panorama ? -right : up;
+        m[4 * row + 2] = panorama ? up : forward;
+        double place = camera.matrix[4 * row + 3] - origin[row];
+        m[4 * row + 3] = std::isfinite(place) ? place : 0.0;
+    }
+    double cofactor[9];
+    for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) {
+            int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+            cofactor[3 * r + c] = m[4 * r1 + c1] * m[4 * r2 + c2] - m[4 * r1 + c2] * m[4 * r2 + c1];
+        }
+    }
+    double det = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
+    if (!(std::fabs(det) > 1e-12)) throw std::invalid_argument("Camera: its matrix is flat. Reset the camera's scale.");
+    for (int i = 0; i < 12; ++i) view.to_world.m[i] = static_cast<float>(m[i]);
+    for (int r = 0; r < 3; ++r) {
+        double shift = 0.0;
+        for (int c = 0; c < 3; ++c) {
+            double inverse = cofactor[3 * c + r] / det;
+            view.to_camera.m[4 * r + c] = static_cast<float>(inverse);
+            shift -= inverse * m[4 * c + 3];
+        }
+        view.to_camera.m[4 * r + 3] = static_cast<float>(shift);
+    }
+}
+
+// The near plane moves towards the camera and the far one away by more than the rounding of a ray's
+// origin and of a hit's distance: what lies exactly in a clipping plane is wholly visible.
+void set_clipping(CameraView& view, const CameraSpec& camera) {
+    constexpr double slack = 4e-6;
+    double reach = std::hypot(view.to_world.m[3], view.to_world.m[7], view.to_world.m[11]);
+    double margin = slack * camera.clip_start + 5e-7 * reach;
+    double start = std::max(camera.clip_start - margin, 0.0);
+    double end = camera.clip_end * (1.0 + slack);
+    double biggest = std::numeric_limits<float>::max();
+    view.clip_start = static_cast<float>(std::min(start, biggest));
+    view.clip_length = static_cast<float>(std::clamp(end - start, 0.0, biggest));
+    if (camera.clip_end < camera.clip_start) view.clip_length = 0.0f;
+}
+
+void set_lens(CameraView& view, const CameraSpec& camera) {
+    view.aperture_radius = 0.0f;
+    view.inverse_focus = 0.0f;
+    view.blades = camera.blades < 3 ? 0.0f : static_cast<float>(camera.blades);
+    view.blades_rotation = static_cast<float>(camera.blades_rotation);
+    view.inverse_aperture_ratio = static_cast<float>(1.0 / std::max(camera.aperture_ratio, 1e-5));
+    if (!camera.use_dof) return;
+    double fstop = std::max(camera.fstop, 1e-5);
+    double focal_length = view.kind == CameraKind::ORTHOGRAPHIC ? 1.0 : camera.lens_mm * 1e-3;
+    view.aperture_radius = static_cast<float>(focal_length / (2.0 * fstop));
+    view.inverse_focus = static_cast<float>(1.0 / std::max(camera.focus_distance, 1e-5));
+}
+
+}  // namespace
+
+CameraView make_camera_view(const CameraSpec& camera, const FrameSpec& frame, const double origin[3]) {
+    if (frame.width < 1 || frame.height < 1)
+        throw std::invalid_argument("Film: the frame is " + std::to_string(frame.width) + " x " +
+                                    std::to_string(frame.height) + " pixels. Give it at least one.");
+    if (!(frame.pixel_aspect[0] > 0.0 && frame.pixel_aspect[1] > 0.0))
+        throw std::invalid_argument("Film: pixel_aspect must be positive.");
+    CameraView view{};
+    if (camera.kind == "PERSP") {
+        view.kind = CameraKind::PERSPECTIVE;
+    } else if (camera.kind == "ORTHO") {
+        view.kind = CameraKind::ORTHOGRAPHIC;
+    } else if (camera.kind == "EQUIRECTANGULAR") {
+        view.kind = CameraKind::EQUIRECTANGULAR;
+    } else {
+        throw std::invalid_argument("Camera: kind \"" + camera.kind +
+                                    "\" is unknown. Use PERSP, ORTHO or EQUIRECTANGULAR.");
+    }
+    set_transforms(view, camera, origin);
+    set_raster_map(view, camera, frame);
+    set_clipping(view, camera);
+    set_lens(view, camera);
+    return view;
+}
+
+}  // namespace luch::cpu
