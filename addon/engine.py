@@ -1,0 +1,72 @@
+"""Blender's callbacks. Each tells its story in a few lines; the work is done elsewhere."""
+
+from __future__ import annotations
+
+import traceback
+from typing import Any
+
+import bpy
+
+from . import passes
+from .export.cache import MeshCache
+from .report import Reporter, describe_error
+from .result import ResultWriter
+
+# Statistics of the last render of each scene, by its name: what panels, scripts and tests read.
+last_stats: dict[str, dict[str, Any]] = {}
+
+
+class LuchRenderEngine(bpy.types.RenderEngine):
+    """Luch as Blender sees it. Blender makes many of these per render, so nothing is built in `__init__`."""
+
+    bl_idname = "LUCH"
+    bl_label = "Luch"
+    bl_use_preview = True
+    bl_use_postprocess = True
+    bl_use_shading_nodes_custom = False
+    bl_use_eevee_viewport = True
+
+    def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
+        """Blender asks which passes there will be."""
+        passes.register_passes(self, scene, renderlayer)
+
+    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """One view layer of one frame. Whatever goes wrong ends as a sentence for the user: an exception that got
+        through here would count as a finished render, or crash Blender when it saves the file."""
+        try:
+            self._render(depsgraph)
+        except (Exception, KeyboardInterrupt) as error:
+            traceback.print_exc()
+            self.report({"ERROR"}, describe_error(error))
+
+    def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        from luch.render import render
+
+        from .export import export_scene
+
+        reporter = Reporter(self, depsgraph.scene)
+        reporter.say("Exporting scene")
+        scene = export_scene(depsgraph, self, cache=self._mesh_cache(depsgraph))
+        reporter.warn(scene.warnings)
+        with ResultWriter(self, depsgraph.view_layer.name, scene.film) as writer:
+            result = render(scene, progress=lambda progress: reporter.progress(progress, writer))
+            writer.write(result.passes)
+        stats = reporter.statistics(scene, result.stats)
+        last_stats[depsgraph.scene.name] = stats
+        writer.stamp(stats, scene)
+
+    def _mesh_cache(self, depsgraph: bpy.types.Depsgraph) -> MeshCache:
+        """The meshes of the frame before, if the user wants them kept; Blender then keeps this engine too."""
+        if not depsgraph.scene.render.use_persistent_data:
+            return MeshCache()
+        if not hasattr(self, "_cache"):
+            self._cache = MeshCache()
+        return self._cache
+
+
+def register() -> None:
+    bpy.utils.register_class(LuchRenderEngine)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(LuchRenderEngine)

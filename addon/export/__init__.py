@@ -1,0 +1,5 @@
+"""From Blender's dependency graph to `luch.scene.Scene`; one file per kind of thing in Blender."""
+
+from .scene import export_scene
+
+__all__ = ["export_scene"]

@@ -1,0 +1,48 @@
+"""Film: resolution, border, pixel filter, passes."""
+
+from __future__ import annotations
+
+import bpy
+from luch.scene import Film
+
+from .. import passes
+from ..settings import effective
+from .context import ExportContext
+
+
+def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
+    """What the film records. size: full frame in pixels, None for the scene's own resolution."""
+    scene, view_layer = context.scene, context.view_layer
+    render = scene.render
+    scale = render.resolution_percentage / 100.0
+    width, height = size or (int(render.resolution_x * scale), int(render.resolution_y * scale))
+    film = Film(
+        width=max(1, width),
+        height=max(1, height),
+        border=_border(render, width, height),
+        pixel_aspect=(render.pixel_aspect_x, render.pixel_aspect_y),
+        filter=effective(scene, "pixel_filter_type"),
+        filter_width=effective(scene, "filter_width"),
+        exposure=effective(scene, "film_exposure"),
+        transparent=render.film_transparent,
+        transparent_glass=effective(scene, "film_transparent_glass"),
+        transparent_roughness=effective(scene, "film_transparent_roughness"),
+        alpha_threshold=view_layer.pass_alpha_threshold,
+        passes=[entry.name for entry in passes.enabled_passes(view_layer)],
+        cryptomatte_depth=passes.cryptomatte_depth(view_layer),
+        lightgroups=[group.name for group in view_layer.lightgroups],
+        aovs=[(aov.name, aov.type) for aov in view_layer.aovs if aov.is_valid],
+    )
+    if scene.world is not None:
+        mist = scene.world.mist_settings
+        film.mist = (mist.start, mist.depth, mist.falloff)
+    return film
+
+
+def _border(render: bpy.types.RenderSettings, width: int, height: int) -> tuple[int, int, int, int] | None:
+    """The rectangle that Blender allocates for a border: fractions of the frame, cut to whole pixels."""
+    if not render.use_border:
+        return None
+    x0, x1 = int(render.border_min_x * width), int(render.border_max_x * width)
+    y0, y1 = int(render.border_min_y * height), int(render.border_max_y * height)
+    return (x0, y0, max(x1, x0 + 1), max(y1, y0 + 1))

@@ -1,0 +1,217 @@
+"""Instances: one pass over the dependency graph's instances, a few microseconds each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from luch.scene import Instances, Mesh, Object
+
+from .cache import MeshCache
+from .context import ExportContext
+from .lights import export_light
+from .materials import MaterialTable
+from .visibility import instance_visibility
+
+# Their meshes arrive as instances of their own (Blender 5): exporting these too would double them.
+LISTED_AGAIN_AS_MESH = frozenset({"CURVE", "SURFACE", "FONT", "META"})
+NOTHING_TO_DRAW = frozenset({"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "GREASEPENCIL"})
+NOT_SUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "a point cloud", "VOLUME": "a volume"}
+NO_OBJECT = -1
+
+
+def export_instances(context: ExportContext, cache: MeshCache) -> None:
+    """Fill meshes, objects, instances, materials and lamps of the scene. Each mesh is read once."""
+    collector = InstanceCollector(context, cache)
+    for item in context.depsgraph.object_instances:
+        if item.show_self:
+            collector.add(item)
+        if item.show_particles:
+            collector.warn_about_hair(item.object)
+    collector.finish()
+
+
+class InstanceCollector:
+    """Rows of `Scene.instances` as they come out of Blender's iterator."""
+
+    def __init__(self, context: ExportContext, cache: MeshCache) -> None:
+        self._context = context
+        self._cache = cache
+        self._materials = MaterialTable(context)
+        self._objects: dict[tuple[int, int, int], int] = {}
+        self._mesh_indices: dict[int, int] = {}
+        self._object_column: list[int] = []
+        self._matrices: list[bytes] = []  # 16 float32 each, rows
+        self._random: list[int] = []
+        self._generated: list[Any] = []
+        self._uv: list[Any] = []
+        self._solid: bool = context.view_layer.use_solid
+
+    def add(self, item: Any) -> None:
+        """One instance: a mesh to draw, a lamp, or nothing for us."""
+        subject = item.object
+        kind = subject.type
+        if kind == "MESH":
+            if self._solid:
+                self._add_mesh(item, subject)
+        elif kind == "LIGHT":
+            self._add_light(item, subject)
+        elif kind in NOT_SUPPORTED:
+            self._context.warn(
+                f'Object "{subject.name}" is {NOT_SUPPORTED[kind]}, which Luch does not draw yet: it is left out.'
+            )
+
+    def warn_about_hair(self, subject: Any) -> None:
+        """Particle hair hides in its object's modifiers; say that it is missing."""
+        if any(
+            system.settings.type == "HAIR" and system.settings.render_type == "PATH"
+            for system in subject.particle_systems
+        ):
+            self._context.warn(f'Object "{subject.name}" has particle hair, which Luch does not draw yet.')
+
+    def finish(self) -> None:
+        """Turn the columns into arrays."""
+        count = len(self._object_column)
+        rows = np.frombuffer(b"".join(self._matrices), dtype=np.float32).reshape(count, 4, 4)
+        matrix = rows[:, :3].astype(np.float64)
+        finite = np.isfinite(matrix).all(axis=(1, 2))
+        if not finite.all():
+            index = self._object_column[int(np.argmin(finite))]
+            name = self._context.result.objects[index].name
+            self._context.warn(f'Object "{name}": its transform is not finite, so it is left out. Clear its transform.')
+        # Signed in Python, 32 random bits in Blender; all ones is exactly 1.
+        random = np.array(self._random, dtype=np.int64) & 0xFFFFFFFF
+        self._context.result.instances = Instances(
+            object=np.array(self._object_column, dtype=np.uint32)[finite],
+            matrix=matrix[finite],
+            random=(random * np.float64(1.0 / 0xFFFFFFFF)).astype(np.float32)[finite],
+            generated=(np.array(self._generated, dtype=np.float32).reshape(count, 3) * 0.5 - 0.5)[finite],
+            uv=np.array(self._uv, dtype=np.float32).reshape(count, 2)[finite],
+        )
+
+    def _add_mesh(self, item: Any, subject: Any) -> None:
+        is_instance = item.is_instance
+        parent = item.parent if is_instance else subject
+        source = item.instance_object if is_instance else subject
+        key = (subject.data.as_pointer(), source.as_pointer(), parent.as_pointer())
+        index = self._objects.get(key)
+        if index is None:
+            index = self._objects[key] = self._add_object(subject, parent)
+        if index == NO_OBJECT:
+            return
+        self._object_column.append(index)
+        self._matrices.append(bytes(item.matrix_world))
+        if is_instance:
+            self._random.append(item.random_id)
+            self._generated.append(item.orco)
+            self._uv.append(item.uv)
+        else:
+            self._random.append(name_hash(subject.name))
+            self._generated.append((1.0, 1.0, 1.0))  # becomes 0 below: no instancer
+            self._uv.append((0.0, 0.0))
+
+    def _add_object(self, subject: Any, parent: Any) -> int:
+        visibility, holdout = instance_visibility(subject, parent, self._view_layer())
+        if visibility == 0:
+            return NO_OBJECT
+        slots = self._materials.slots(subject, subject.data)
+        mesh = self._mesh_index(subject, parent, slots)
+        if mesh == NO_OBJECT:
+            return NO_OBJECT
+        result = self._context.result
+        result.objects.append(
+            Object(
+                name=subject.name,
+                mesh=mesh,
+                materials=slots,
+                pass_index=subject.pass_index,
+                color=tuple(subject.color),
+                visibility=visibility,
+                holdout=holdout,
+                shadow_catcher=subject.is_shadow_catcher,
+                lightgroup=subject.lightgroup or parent.lightgroup,
+                asset=asset_name(parent),
+            )
+        )
+        if subject.is_shadow_catcher:
+            self._context.warn(f'Object "{subject.name}" is a shadow catcher; Luch draws it as an ordinary object.')
+        return len(result.objects) - 1
+
+    def _view_layer(self) -> bpy.types.ViewLayer:
+        """The original view layer: what collection flags are asked of."""
+        scene = self._context.scene.original
+        return scene.view_layers[self._context.view_layer.name]
+
+    def _mesh_index(self, subject: Any, parent: Any, slots: list[int]) -> int:
+        wanted = self._materials.attributes(slots)
+        pointer = subject.data.as_pointer()
+        index = self._mesh_indices.get(pointer)
+        meshes = self._context.result.meshes
+        mesh: Mesh | None
+        if index is None:
+            mesh = self._cache.mesh(subject, parent, wanted, self._context)
+            index = self._mesh_indices[pointer] = NO_OBJECT if mesh is None else len(meshes)
+            if mesh is not None:
+                meshes.append(mesh)
+        elif index != NO_OBJECT:  # another object's materials may ask for more
+            mesh = self._cache.mesh(subject, parent, wanted, self._context)
+            if mesh is not None:
+                meshes[index] = mesh
+        return index
+
+    def _add_light(self, item: Any, subject: Any) -> None:
+        parent = item.parent if item.is_instance else subject
+        visibility, _ = instance_visibility(subject, parent, self._view_layer())
+        rows = np.frombuffer(bytes(item.matrix_world), dtype=np.float32).reshape(4, 4)[:3]
+        if not np.isfinite(rows).all():
+            self._context.warn(f'Light "{subject.name}": its transform is not finite, so it is left out.')
+            return
+        seed = item.random_id if item.is_instance else name_hash(subject.name)
+        random = (seed & 0xFFFFFFFF) / 0xFFFFFFFF
+        light = export_light(subject, rows.astype(np.float64), random, visibility, self._context)
+        if np.isfinite([light.power, *light.color]).all():
+            self._context.result.lights.append(light)
+        else:
+            self._context.warn(f'Light "{subject.name}": its power is not finite, so it is left out.')
+
+
+def asset_name(subject: Any) -> str:
+    """The name at the top of an object's chain of parents: Cryptomatte's asset."""
+    while subject.parent is not None:
+        subject = subject.parent
+    return str(subject.name)
+
+
+def name_hash(name: str) -> int:
+    """Random bits of an object that no instancer numbers, from its name: those that Blender users know from Cycles."""
+    value = 0
+    for byte in name.encode():
+        signed = byte - 256 if byte >= 128 else byte
+        value = (value * 37 + signed) & 0xFFFFFFFF
+    return _mix(value)
+
+
+def _mix(value: int) -> int:
+    """Bob Jenkins' final mix (lookup3, public domain) of one number and 0."""
+    mask = 0xFFFFFFFF
+
+    def rotate(x: int, bits: int) -> int:
+        return ((x << bits) | (x >> (32 - bits))) & mask
+
+    a = b = c = (0xDEADBEEF + (2 << 2) + 13) & mask
+    a = (a + value) & mask
+    c ^= b
+    c = (c - rotate(b, 14)) & mask
+    a ^= c
+    a = (a - rotate(c, 11)) & mask
+    b ^= a
+    b = (b - rotate(a, 25)) & mask
+    c ^= b
+    c = (c - rotate(b, 16)) & mask
+    a ^= c
+    a = (a - rotate(c, 4)) & mask
+    b ^= a
+    b = (b - rotate(a, 14)) & mask
+    c ^= b
+    return (c - rotate(b, 24)) & mask

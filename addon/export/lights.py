@@ -1,0 +1,61 @@
+"""Lamps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from luch.scene import F64, Light
+
+from .context import ExportContext
+
+
+def export_light(subject: Any, matrix: F64, random: float, visibility: int, context: ExportContext) -> Light:
+    """A lamp in Blender's units. matrix: (3, 4) object to world."""
+    from .nodes import compile_light
+
+    lamp = subject.data
+    colour = np.array(lamp.color, dtype=np.float64)
+    if lamp.use_temperature:
+        colour *= np.array(lamp.temperature_color, dtype=np.float64)
+    colour *= 2.0**lamp.exposure
+    light = Light(
+        name=subject.name,
+        kind=lamp.type,
+        matrix=matrix,
+        color=(float(colour[0]), float(colour[1]), float(colour[2])),
+        power=lamp.energy,
+        normalize=lamp.normalize,
+        program=compile_light(lamp, context),
+        visibility=visibility,
+        cast_shadow=lamp.use_shadow,
+        lightgroup=subject.lightgroup,
+        random=random,
+    )
+    _add_shape(light, lamp)
+    cycles = getattr(lamp, "cycles", None)
+    if cycles is not None:
+        light.use_mis = cycles.use_multiple_importance_sampling
+        light.max_bounces = cycles.max_bounces
+        if lamp.type == "AREA" and cycles.is_portal:
+            context.warn(
+                f'Light "{subject.name}" is a portal; Luch samples the world without portals and leaves it out.'
+            )
+            light.power = 0.0
+    return light
+
+
+def _add_shape(light: Light, lamp: Any) -> None:
+    if lamp.type in ("POINT", "SPOT"):
+        light.radius = lamp.shadow_soft_size
+        light.soft_falloff = lamp.use_soft_falloff
+    if lamp.type == "SPOT":
+        light.spot_size = lamp.spot_size
+        light.spot_blend = lamp.spot_blend
+    if lamp.type == "SUN":
+        light.angle = lamp.angle
+    if lamp.type == "AREA":
+        light.shape = lamp.shape
+        light.size = lamp.size
+        light.size_y = lamp.size_y if lamp.shape in ("RECTANGLE", "ELLIPSE") else lamp.size
+        light.spread = lamp.spread

@@ -1,0 +1,53 @@
+"""Materials: which one a slot shows, each compiled once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from luch.scene import Material
+
+from .context import ExportContext
+
+
+class MaterialTable:
+    """Indices into `Scene.materials`, by Blender material."""
+
+    def __init__(self, context: ExportContext) -> None:
+        self._context = context
+        self._indices: dict[int, int] = {}
+        self._override: Any = context.view_layer.material_override
+
+    def slots(self, subject: Any, mesh: Any) -> list[int]:
+        """Material indices of an object's slots, at least one. An empty slot shows the default material.
+
+        The evaluated mesh knows the materials that modifiers and geometry nodes gave it; the object's own slots
+        win where they are linked to the object.
+        """
+        own, given = subject.material_slots, mesh.materials
+        count = max(len(own), len(given), 1)
+        return [self.index(self._material(own, given, slot)) for slot in range(count)]
+
+    def index(self, material: Any) -> int:
+        """Index into `Scene.materials`; compiles on first sight."""
+        material = self._override or material
+        key = material.original.session_uid if material else 0
+        index = self._indices.get(key)
+        if index is None:
+            index = self._indices[key] = len(self._context.result.materials)
+            self._context.result.materials.append(self._compile(material))
+        return index
+
+    def attributes(self, indices: list[int]) -> set[str]:
+        """Names of the mesh attributes that these materials read."""
+        return {name for index in indices for name in self._context.result.materials[index].surface.attributes}
+
+    @staticmethod
+    def _material(own: Any, given: Any, slot: int) -> Any:
+        if slot < len(own) and own[slot].link == "OBJECT":
+            return own[slot].material
+        return given[slot] if slot < len(given) else None
+
+    def _compile(self, material: Any) -> Material:
+        from .nodes import compile_material
+
+        return compile_material(material, self._context)

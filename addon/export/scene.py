@@ -1,0 +1,54 @@
+"""The whole scene, as the story of one export."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from luch.scene import Scene
+
+from .cache import MeshCache
+from .camera import export_camera
+from .context import ExportContext
+from .film import export_film
+from .instances import export_instances
+from .settings import export_settings
+from .world import export_world
+
+
+def export_scene(
+    depsgraph: bpy.types.Depsgraph,
+    engine: bpy.types.RenderEngine | None = None,
+    *,
+    cache: MeshCache | None = None,
+) -> Scene:
+    """What Blender evaluated, as plain arrays that share nothing with Blender.
+
+    engine: the render engine, for its camera and resolution; None: the scene's own. cache: meshes of the frame before.
+    Raises ValueError, with a sentence for the user, if there is nothing to see through (no camera).
+    """
+    result = Scene(name=depsgraph.scene.name, frame=depsgraph.scene.frame_current)
+    context = ExportContext(depsgraph, result)
+    cache = cache or MeshCache()
+    cache.begin(depsgraph)
+    result.camera = export_camera(_camera(context, engine), context, engine)
+    result.film = export_film(context, (engine.resolution_x, engine.resolution_y) if engine else None)
+    result.settings = export_settings(context)
+    result.world = export_world(context)
+    export_instances(context, cache)
+    result.origin = _origin(result)
+    return result
+
+
+def _camera(context: ExportContext, engine: bpy.types.RenderEngine | None) -> Any:
+    chosen = (engine.camera_override if engine else None) or context.scene.camera
+    return chosen.evaluated_get(context.depsgraph) if chosen is not None and not chosen.is_evaluated else chosen
+
+
+def _origin(result: Scene) -> tuple[float, float, float]:
+    """The camera's place, so that what it sees keeps all digits however far away from Blender's origin it is."""
+    place = result.camera.matrix[:, 3]
+    if not np.isfinite(place).all():
+        raise ValueError("The camera's transform is not finite: clear it with Object > Clear.")
+    return (float(place[0]), float(place[1]), float(place[2]))

@@ -1,0 +1,60 @@
+"""Settings: `scene.luch`, with Cycles' values where only those were set."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from luch.scene import Settings
+
+from ..settings import effective
+from .context import ExportContext
+
+SAME_NAME = (
+    "samples",
+    "time_limit",
+    "max_bounces",
+    "diffuse_bounces",
+    "glossy_bounces",
+    "transmission_bounces",
+    "min_light_bounces",
+    "min_transparent_bounces",
+    "caustics_reflective",
+    "caustics_refractive",
+    "light_sampling_threshold",
+)
+
+
+def export_settings(context: ExportContext) -> Settings:
+    """What trades accuracy for time."""
+    scene = context.scene
+    settings = Settings(
+        seed=_seed(scene),
+        threads=_threads(scene),
+        transparent_bounces=effective(scene, "transparent_max_bounces"),
+        clamp_direct=effective(scene, "sample_clamp_direct"),
+        clamp_indirect=effective(scene, "sample_clamp_indirect"),
+        filter_glossy=effective(scene, "blur_glossy"),
+        light_tree=effective(scene, "use_light_tree"),
+        accelerator=scene.luch.accelerator,
+        **{name: effective(scene, name) for name in SAME_NAME},
+    )
+    if context.view_layer.samples > 0:
+        settings.samples = context.view_layer.samples
+    if scene.world is not None:
+        settings.ao_distance = scene.world.light_settings.distance
+    return settings
+
+
+def _seed(scene: bpy.types.Scene) -> int:
+    """The seed of this frame: another one in every frame if the user asks so."""
+    seed = int(effective(scene, "seed"))
+    if not effective(scene, "use_animated_seed"):
+        return seed
+    # Any mixing of the two numbers serves; SeedSequence makes neighbours independent.
+    return int(np.random.SeedSequence([seed, scene.frame_current & 0xFFFFFFFF]).generate_state(1)[0] >> 1)
+
+
+def _threads(scene: bpy.types.Scene) -> int:
+    if scene.luch.threads:
+        return int(scene.luch.threads)
+    return scene.render.threads if scene.render.threads_mode == "FIXED" else 0

@@ -1,0 +1,140 @@
+"""Luch's settings in a .blend file: `scene.luch` and `view_layer.luch`. Names shared with Cycles mean the same."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+
+
+def _bounces(name: str, default: int, what: str) -> bpy.props._PropertyDeferred:
+    return IntProperty(name=name, default=default, min=0, max=1024, description=what)
+
+
+class LuchSceneSettings(bpy.types.PropertyGroup):
+    """Render settings of a scene."""
+
+    follow_cycles: BoolProperty(
+        name="Follow Cycles",
+        default=True,
+        description="A setting that was changed for Cycles and never here keeps Cycles' value",
+    )
+    device: EnumProperty(
+        name="Device", items=[("CPU", "CPU", "Render on the processor")], default="CPU", description="What computes"
+    )
+    accelerator: EnumProperty(
+        name="Structure",
+        items=[
+            ("AUTO", "Automatic", "The fastest structure for the scene"),
+            ("BVH8", "BVH, 8 wide", "Bounding volume hierarchy with eight children a node"),
+            ("BRUTE", "Brute Force", "Every ray tests every triangle: the oracle, for tiny scenes"),
+        ],
+        default="AUTO",
+        description="Acceleration structure that rays travel through",
+    )
+    threads: IntProperty(name="Threads", default=0, min=0, max=1024, description="Threads to use; 0 for all")
+    samples: IntProperty(name="Max Samples", default=128, min=1, max=1 << 24, description="Paths through every pixel")
+    time_limit: FloatProperty(
+        name="Time Limit",
+        default=0.0,
+        min=0.0,
+        unit="TIME_ABSOLUTE",
+        description="Stop after this many seconds; 0 for no limit",
+    )
+    seed: IntProperty(name="Seed", default=0, min=0, description="Chooses the noise; the picture stays the same")
+    use_animated_seed: BoolProperty(
+        name="Use Animated Seed", default=False, description="Another noise in every frame of an animation"
+    )
+    max_bounces: _bounces("Max Bounces", 12, "Bounces of any kind on a path")
+    diffuse_bounces: _bounces("Diffuse Bounces", 4, "Bounces off diffuse surfaces on a path")
+    glossy_bounces: _bounces("Glossy Bounces", 4, "Bounces off glossy surfaces on a path")
+    transmission_bounces: _bounces("Transmission Bounces", 12, "Passages through glass on a path")
+    transparent_max_bounces: _bounces("Transparent Max Bounces", 8, "Transparent surfaces a ray passes straight")
+    min_light_bounces: _bounces("Min Light Bounces", 0, "Bounces before a path may be ended by chance")
+    min_transparent_bounces: _bounces(
+        "Min Transparent Bounces", 0, "Transparent surfaces before a ray may be ended by chance"
+    )
+    sample_clamp_direct: FloatProperty(
+        name="Clamp Direct", default=0.0, min=0.0, description="Cut brighter direct samples: biased; 0 for never"
+    )
+    sample_clamp_indirect: FloatProperty(
+        name="Clamp Indirect", default=0.0, min=0.0, description="Cut brighter indirect samples: biased; 0 for never"
+    )
+    blur_glossy: FloatProperty(
+        name="Filter Glossy",
+        default=0.0,
+        min=0.0,
+        max=10.0,
+        description="Roughen glossy surfaces after blurry bounces: less noise, biased; 0 for never",
+    )
+    caustics_reflective: BoolProperty(
+        name="Reflective Caustics", default=True, description="Light reflected by glossy onto diffuse surfaces"
+    )
+    caustics_refractive: BoolProperty(
+        name="Refractive Caustics", default=True, description="Light refracted by glass onto diffuse surfaces"
+    )
+    use_light_tree: BoolProperty(
+        name="Light Tree", default=True, description="Choose lights by what they contribute at a point"
+    )
+    light_sampling_threshold: FloatProperty(
+        name="Light Threshold",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        description="End light samples weaker than this by chance, when the light tree is off; 0 for never",
+    )
+    pixel_filter_type: EnumProperty(
+        name="Pixel Filter",
+        items=[
+            ("BOX", "Box", "Box"),
+            ("GAUSSIAN", "Gaussian", "Gaussian"),
+            ("BLACKMAN_HARRIS", "Blackman-Harris", "Blackman-Harris"),
+        ],
+        default="BLACKMAN_HARRIS",
+        description="How the light around a pixel's centre is averaged",
+    )
+    filter_width: FloatProperty(
+        name="Filter Width", default=1.5, min=0.01, max=10.0, subtype="PIXEL", description="Width of the pixel filter"
+    )
+    film_exposure: FloatProperty(
+        name="Exposure", default=1.0, min=0.0, max=10.0, description="Multiplies the picture's brightness"
+    )
+    film_transparent_glass: BoolProperty(
+        name="Transparent Glass", default=False, description="Glass seen by a transparent film is transparent"
+    )
+    film_transparent_roughness: FloatProperty(
+        name="Roughness Threshold",
+        default=0.1,
+        min=0.0,
+        max=1.0,
+        description="Glass rougher than this stays opaque on a transparent film",
+    )
+
+
+class LuchViewLayerSettings(bpy.types.PropertyGroup):
+    """Passes that Blender has no switch for."""
+
+    use_pass_denoising: BoolProperty(
+        name="Denoising Data",
+        default=False,
+        description="Denoising Albedo and Denoising Normal, for the compositor's Denoise node",
+    )
+    use_pass_sample_count: BoolProperty(
+        name="Sample Count", default=False, description="How many paths went through each pixel"
+    )
+
+
+CLASSES = (LuchSceneSettings, LuchViewLayerSettings)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.luch = PointerProperty(type=LuchSceneSettings)
+    bpy.types.ViewLayer.luch = PointerProperty(type=LuchViewLayerSettings)
+
+
+def unregister() -> None:
+    del bpy.types.ViewLayer.luch
+    del bpy.types.Scene.luch
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,103 @@
+"""What a render tells its user: progress, time left, memory, warnings, errors, statistics."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import bpy
+from luch.scene import Scene
+
+if TYPE_CHECKING:
+    from .result import ResultWriter
+
+FIRST_PICTURE_S = 0.5
+PICTURE_INTERVAL_GROWTH = 1.5
+LONGEST_PICTURE_INTERVAL_S = 20.0
+MIB = 1024.0 * 1024.0
+
+
+class Reporter:
+    """Speaks for one render through Blender's status line, info area and console."""
+
+    def __init__(self, engine: bpy.types.RenderEngine, scene: bpy.types.Scene) -> None:
+        self._engine = engine
+        self._scene_name = scene.name
+        self._interval_s = FIRST_PICTURE_S
+        self._next_picture = time.monotonic() + FIRST_PICTURE_S
+        self._peak_memory_mib = 0.0
+        self._started = time.monotonic()
+        self._export_s = 0.0
+        self.cancelled = False
+
+    def say(self, text: str) -> None:
+        """Put a line into the render's header."""
+        self._engine.update_stats("", f"Luch: {text}")
+
+    def warn(self, warnings: list[str]) -> None:
+        """Show each warning of the export in the info area; the export has ended here."""
+        self._export_s = time.monotonic() - self._started
+        for warning in warnings:
+            self._engine.report({"WARNING"}, warning)
+
+    def progress(self, progress: Any, writer: ResultWriter) -> bool:
+        """Called by the renderer between batches. False: the user wants it to end."""
+        self._peak_memory_mib = max(self._peak_memory_mib, progress.memory_bytes / MIB)
+        self._engine.update_progress(progress.samples / max(1, progress.total_samples))
+        self._engine.update_memory_stats(memory_used=progress.memory_bytes / MIB, memory_peak=self._peak_memory_mib)
+        self._engine.update_stats("", progress_line(progress))
+        self._show_picture(progress, writer)
+        self.cancelled = self._engine.test_break()
+        return not self.cancelled
+
+    def statistics(self, scene: Scene, stats: dict[str, Any]) -> dict[str, Any]:
+        """Everything known about the render, fit for JSON."""
+        return {
+            **stats,
+            "scene": scene.name,
+            "frame": scene.frame,
+            "seed": scene.settings.seed,
+            "device": stats.get("device", "CPU"),
+            "export_seconds": round(self._export_s, 4),
+            "total_seconds": round(time.monotonic() - self._started, 4),
+            "cancelled": self.cancelled,
+            "warnings": list(scene.warnings),
+        }
+
+    def _show_picture(self, progress: Any, writer: ResultWriter) -> None:
+        """The film so far, ever less often: converting it costs, and late changes are small."""
+        now = time.monotonic()
+        if bpy.app.background or now < self._next_picture:
+            return
+        writer.show(progress.passes())
+        self._interval_s = min(self._interval_s * PICTURE_INTERVAL_GROWTH, LONGEST_PICTURE_INTERVAL_S)
+        self._next_picture = time.monotonic() + self._interval_s
+
+
+def progress_line(progress: Any) -> str:
+    """For the status line: "Sample 32/128 | Remaining 00:14 | 312 MiB"."""
+    parts = [f"Sample {progress.samples}/{progress.total_samples}"]
+    if progress.remaining_seconds is not None and progress.remaining_seconds >= 0.0:
+        parts.append(f"Remaining {clock(progress.remaining_seconds)}")
+    parts.append(f"{progress.memory_bytes / MIB:.0f} MiB")
+    return " | ".join(parts)
+
+
+def clock(seconds: float) -> str:
+    """Seconds as Blender writes them: mm:ss, or h:mm:ss."""
+    whole = round(min(seconds, 359_999.0))  # infinite and silly estimates end here
+    hours, rest = divmod(whole, 3600)
+    minutes, left = divmod(rest, 60)
+    return f"{hours}:{minutes:02d}:{left:02d}" if hours else f"{minutes:02d}:{left:02d}"
+
+
+def describe_error(error: BaseException) -> str:
+    """One sentence for the info area; the traceback goes to the console."""
+    if isinstance(error, KeyboardInterrupt):
+        return "Luch: the render was interrupted."
+    if isinstance(error, MemoryError):
+        return "Luch: there is not enough memory for this scene. Lower the resolution or simplify the scene."
+    if isinstance(error, ImportError):
+        return f"Luch: its ray tracing core cannot be loaded ({error}). Install the extension again."
+    text = " ".join(str(error).split()) or type(error).__name__
+    return f"Luch: {text}" if isinstance(error, ValueError) else f"Luch: {text} ({type(error).__name__})"

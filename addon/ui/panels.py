@@ -1,0 +1,175 @@
+"""Render Properties and View Layer Properties of Luch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..settings import effective, follows_cycles
+
+
+class LuchPanel:
+    """Shown while Luch is the scene's engine."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+    COMPAT_ENGINES = {"LUCH"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine in cls.COMPAT_ENGINES
+
+
+def draw_settings(layout: Any, scene: bpy.types.Scene, *names: str) -> None:
+    """One row a setting; where Cycles' value holds, it stands beside."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    for name in names:
+        row = layout.row()
+        row.prop(scene.luch, name)
+        if follows_cycles(scene, name):
+            value = effective(scene, name)
+            row.label(text=f"Cycles: {value:.4g}" if isinstance(value, float) else f"Cycles: {value}")
+
+
+class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
+    """Samples, time, seed."""
+
+    bl_label = "Sampling"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_settings(self.layout, context.scene, "samples", "time_limit", "seed", "use_animated_seed")
+        self.layout.prop(context.scene.luch, "follow_cycles")
+
+
+class LUCH_RENDER_PT_lights(LuchPanel, bpy.types.Panel):
+    """How lights are chosen."""
+
+    bl_label = "Lights"
+    bl_parent_id = "LUCH_RENDER_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_settings(self.layout, context.scene, "use_light_tree", "light_sampling_threshold")
+
+
+class LUCH_RENDER_PT_light_paths(LuchPanel, bpy.types.Panel):
+    """Bounces by kind."""
+
+    bl_label = "Light Paths"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_settings(
+            self.layout,
+            context.scene,
+            "max_bounces",
+            "diffuse_bounces",
+            "glossy_bounces",
+            "transmission_bounces",
+            "transparent_max_bounces",
+            "min_light_bounces",
+            "min_transparent_bounces",
+        )
+
+
+class LUCH_RENDER_PT_bias(LuchPanel, bpy.types.Panel):
+    """What trades light for less noise. All off by default."""
+
+    bl_label = "Clamping and Caustics"
+    bl_parent_id = "LUCH_RENDER_PT_light_paths"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_settings(
+            self.layout,
+            context.scene,
+            "sample_clamp_direct",
+            "sample_clamp_indirect",
+            "blur_glossy",
+            "caustics_reflective",
+            "caustics_refractive",
+        )
+
+
+class LUCH_RENDER_PT_film(LuchPanel, bpy.types.Panel):
+    """Exposure, transparency, pixel filter."""
+
+    bl_label = "Film"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        scene = context.scene
+        draw_settings(self.layout, scene, "film_exposure", "pixel_filter_type", "filter_width")
+        self.layout.prop(scene.render, "film_transparent")
+        if scene.render.film_transparent:
+            draw_settings(self.layout, scene, "film_transparent_glass", "film_transparent_roughness")
+
+
+class LUCH_RENDER_PT_performance(LuchPanel, bpy.types.Panel):
+    """Device, threads, memory against time."""
+
+    bl_label = "Performance"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        scene = context.scene
+        draw_settings(self.layout, scene, "device", "accelerator", "threads")
+        self.layout.prop(scene.render, "use_persistent_data")
+
+
+class LUCH_VIEWLAYER_PT_passes(LuchPanel, bpy.types.Panel):
+    """Passes of a view layer, under Blender's names."""
+
+    bl_label = "Passes"
+    bl_context = "view_layer"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layer = context.view_layer
+        column = layout.column(heading="Data")
+        for name in ("combined", "z", "mist", "position", "normal", "uv", "object_index", "material_index"):
+            column.prop(layer, f"use_pass_{name}")
+        column.prop(layer.luch, "use_pass_denoising")
+        column.prop(layer.luch, "use_pass_sample_count")
+        for kind in ("diffuse", "glossy", "transmission"):
+            row = layout.row(heading=kind.title(), align=True)
+            for part in ("direct", "indirect", "color"):
+                row.prop(layer, f"use_pass_{kind}_{part}", text=part.title(), toggle=True)
+        column = layout.column(heading="Other")
+        for name in ("emit", "environment", "ambient_occlusion"):
+            column.prop(layer, f"use_pass_{name}")
+        layout.prop(layer, "pass_alpha_threshold")
+        self._draw_cryptomatte(layout, layer)
+
+    @staticmethod
+    def _draw_cryptomatte(layout: Any, layer: Any) -> None:
+        column = layout.column(heading="Cryptomatte")
+        for name in ("object", "material", "asset"):
+            column.prop(layer, f"use_pass_cryptomatte_{name}", text=name.title())
+        column.prop(layer, "pass_cryptomatte_depth", text="Levels")
+
+
+CLASSES = (
+    LUCH_RENDER_PT_sampling,
+    LUCH_RENDER_PT_lights,
+    LUCH_RENDER_PT_light_paths,
+    LUCH_RENDER_PT_bias,
+    LUCH_RENDER_PT_film,
+    LUCH_RENDER_PT_performance,
+    LUCH_VIEWLAYER_PT_passes,
+)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
