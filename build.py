@@ -40,7 +40,7 @@ def _parser() -> argparse.ArgumentParser:
 
     render = add("render", "Render a .blend file, or the demo scene, with Luch inside Blender.")
     render.add_argument("file", nargs="?", help="a .blend file (default: the demo scene, built by its script)")
-    render.add_argument("--samples", type=int, help="samples per pixel (default: the file's; the demo: 256)")
+    render.add_argument("--samples", type=int, help="samples per pixel (default: the file's; the demo: 64)")
     render.add_argument("--time", type=float, help="stop after this many seconds of rendering")
     render.add_argument("--seed", type=int, help="seed of the sampler")
     render.add_argument("--frame", type=int, help="frame to render (default: the file's current one)")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -13,8 +12,7 @@ import bpy
 from buildtools.inside import session
 from buildtools.places import OUT, ROOT
 
-DEMO = ROOT / "tests" / "scenes" / "demo.py"
-DEMO_SAMPLES = 256
+DEMO_SAMPLES = 64
 
 
 def main(options: dict[str, Any]) -> int:
@@ -43,10 +41,9 @@ def main(options: dict[str, Any]) -> int:
 
 
 def _build_demo() -> None:
-    spec = importlib.util.spec_from_file_location("demo", DEMO)
-    assert spec is not None and spec.loader is not None
-    demo = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(demo)
+    sys.path.insert(0, str(ROOT / "tests"))
+    from scenes import demo
+
     demo.build()
 
 

@@ -1,0 +1,1 @@
+"""Scenes made by script from Blender's own primitives: nothing is downloaded, nothing is copied."""
