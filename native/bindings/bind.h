@@ -7,6 +7,7 @@ namespace luch::bindings {
 namespace py = pybind11;
 
 void bind_camera(py::module_& m);
+void bind_film(py::module_& m);
 void bind_math(py::module_& m);
 void bind_sampling(py::module_& m);
 void bind_shade(py::module_& m);

@@ -36,8 +36,8 @@ Floats camera_rays(const py::handle& camera, const py::handle& film, const Float
     for (py::ssize_t i = 0; i < raster.shape(0); ++i) {
         const float *r = raster.data(i, 0), *u = lens.data(i, 0);
         CameraRay c = generate_ray(view, {r[0], r[1]}, {u[0], u[1]});
-        float row[10] = {c.ray.origin.x,    c.ray.origin.y,    c.ray.origin.z, c.ray.direction.x, c.ray.direction.y,
-                         c.ray.direction.z, c.ray.t_min,       c.ray.t_max,    c.footprint,       c.spread};
+        float row[10] = {c.ray.origin.x,    c.ray.origin.y, c.ray.origin.z, c.ray.direction.x, c.ray.direction.y,
+                         c.ray.direction.z, c.ray.t_min,    c.ray.t_max,    c.footprint,       c.spread};
         std::copy(row, row + 10, out.mutable_data(i, 0));
     }
     return out;

@@ -20,8 +20,8 @@ Fit fit_sensor(const CameraSpec& camera, const FrameSpec& frame, CameraKind kind
     bool wide = frame.width * aspect > frame.height;
     bool horizontal = camera.sensor_fit == "HORIZONTAL" || (camera.sensor_fit == "AUTO" && wide);
     double sensor = camera.sensor_fit == "VERTICAL" ? camera.sensor_height_mm : camera.sensor_width_mm;
-    double half = kind == CameraKind::ORTHOGRAPHIC ? 0.5 * camera.ortho_scale
-                                                   : 0.5 * sensor / std::max(camera.lens_mm, 1e-9);
+    double half =
+        kind == CameraKind::ORTHOGRAPHIC ? 0.5 * camera.ortho_scale : 0.5 * sensor / std::max(camera.lens_mm, 1e-9);
     if (horizontal) return {half, static_cast<double>(frame.width), frame.width * aspect};
     return {half, frame.height / aspect, static_cast<double>(frame.height)};
 }

@@ -40,8 +40,7 @@ PixelFilter make_pixel_filter(const std::string& kind, double width) {
     }
     constexpr int steps = 1 << 15;  // of the numerical integral
     std::vector<double> cumulative(steps + 1, 0.0);
-    for (int i = 0; i < steps; ++i)
-        cumulative[i + 1] = cumulative[i] + std::max(shape((i + 0.5) / steps - 0.5), 0.0);
+    for (int i = 0; i < steps; ++i) cumulative[i + 1] = cumulative[i] + std::max(shape((i + 0.5) / steps - 0.5), 0.0);
     // Where on the support, -1/2 .. 1/2, the cumulative probability reaches `share`.
     int step = 0;
     auto invert = [&](double share) {

@@ -1,0 +1,109 @@
+// The film in Python: what luch.render returns, and a hand-fed one for tests.
+#include "bindings/film.h"
+
+#include <pybind11/stl.h>
+
+#include "bindings/bind.h"
+
+namespace luch::bindings {
+namespace {
+
+using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+// Feeds one pixel the rows of `values` as successive samples of one pass; returns how many rows were
+// not finite. channels 1: a value, 3: a colour, 4: a colour and transparency (Combined).
+u64 add_samples(cpu::Film& film, u32 pixel, u32 channel, const Floats& values) {
+    if (values.ndim() != 2) throw py::value_error("values must have shape (N, channels)");
+    FilmWriter writer{film.view(), 0};
+    py::ssize_t channels = values.shape(1);
+    for (py::ssize_t i = 0; i < values.shape(0); ++i) {
+        const float* v = values.data(i, 0);
+        if (channels == 1) film_add(writer, pixel, channel, v[0]);
+        if (channels >= 3) film_add(writer, pixel, channel, Color{v[0], v[1], v[2]});
+        if (channels == 4) film_add(writer, pixel, channel + 3, v[3]);
+    }
+    return writer.rejected;
+}
+
+}  // namespace
+
+cpu::FilmSpec read_film(const py::handle& film, const py::handle& origin) {
+    cpu::FilmSpec spec;
+    spec.width = film.attr("width").cast<u32>();
+    spec.height = film.attr("height").cast<u32>();
+    if (py::object border = film.attr("border"); !border.is_none()) {
+        auto [x0, y0, x1, y1] = border.cast<std::tuple<u32, u32, u32, u32>>();
+        if (!(x0 < x1 && y0 < y1 && x1 <= spec.width && y1 <= spec.height))
+            throw py::value_error("Film: border must be x0 < x1 <= width, y0 < y1 <= height");
+        spec.x0 = x0, spec.y0 = y0, spec.width = x1 - x0, spec.height = y1 - y0;
+    }
+    py::sequence place = py::reinterpret_borrow<py::sequence>(origin);
+    for (int k = 0; k < 3; ++k) spec.origin[k] = place[k].cast<double>();
+    spec.exposure = film.attr("exposure").cast<float>();
+    spec.passes = film.attr("passes").cast<std::vector<std::string>>();
+    spec.cryptomatte_depth = film.attr("cryptomatte_depth").cast<u32>();
+    spec.lightgroups = film.attr("lightgroups").cast<std::vector<std::string>>();
+    for (const auto& [name, kind] : film.attr("aovs").cast<std::vector<std::pair<std::string, std::string>>>())
+        spec.aovs.push_back({name, kind == "COLOR"});
+    return spec;
+}
+
+py::dict resolve_film(const cpu::Film& film) {
+    py::dict passes;
+    for (const cpu::Pass& pass : film.passes()) {
+        Floats pixels({py::ssize_t{film.height()}, py::ssize_t{film.width()}, py::ssize_t{pass.channels}});
+        float* to = pixels.mutable_data();
+        {
+            py::gil_scoped_release release;
+            film.resolve(pass, to);
+        }
+        passes[py::str(pass.name)] = pixels;
+    }
+    return passes;
+}
+
+void bind_film(py::module_& m) {
+    auto film = m.def_submodule("film", "Sums of samples, and render passes read from them.");
+    py::class_<cpu::Film>(film, "Film")
+        .def(py::init([](const py::handle& settings, const py::handle& origin, bool halves) {
+                 cpu::FilmSpec spec = read_film(settings, origin);
+                 spec.halves = halves;
+                 return std::make_unique<cpu::Film>(spec);
+             }),
+             py::arg("film"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0), py::arg("halves") = false)
+        .def("channel",
+             [](const cpu::Film& self, const std::string& name) {
+                 for (const cpu::Pass& pass : self.passes())
+                     if (pass.name == name) return pass.channel;
+                 throw py::key_error(name);
+             })
+        .def("stride", [](cpu::Film& self) { return self.view().layout.stride; })
+        .def("add_samples", &add_samples, py::arg("pixel"), py::arg("channel"), py::arg("values"))
+        .def("add_crypto",
+             [](cpu::Film& self, u32 pixel, u32 channel, float id, float weight) {
+                 FilmWriter writer{self.view(), 0};
+                 film_add_crypto(writer, pixel, channel, id, weight);
+             })
+        .def("set_first",
+             [](cpu::Film& self, u32 pixel, float depth, const std::array<float, 3>& position) {
+                 FilmWriter writer{self.view(), 0};
+                 film_set(writer, pixel, writer.film.layout.depth, depth);
+                 film_set_position(writer, pixel, {position[0], position[1], position[2]});
+             })
+        .def("set_background",
+             [](cpu::Film& self, u32 pixel) {
+                 FilmWriter writer{self.view(), 0};
+                 film_set_background(writer, pixel);
+             })
+        .def(
+            "count_samples",
+            [](cpu::Film& self, u32 pixel, u32 samples, bool other_half) {
+                FilmWriter writer{self.view(), 0};
+                film_count_samples(writer, pixel, other_half, samples);
+            },
+            py::arg("pixel"), py::arg("samples"), py::arg("other_half") = false)
+        .def("merge", &cpu::Film::merge)
+        .def("resolve", &resolve_film);
+}
+
+}  // namespace luch::bindings

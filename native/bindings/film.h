@@ -1,0 +1,14 @@
+// Reads luch.scene.Film from Python and gives a film's passes to Python.
+#pragma once
+#include "bindings/bind.h"
+#include "cpu/film.h"
+
+namespace luch::bindings {
+
+// origin: Scene.origin.
+cpu::FilmSpec read_film(const py::handle& film, const py::handle& origin);
+
+// {pass name: float32 (H, W, channels)}, bottom row first.
+py::dict resolve_film(const cpu::Film& film);
+
+}  // namespace luch::bindings

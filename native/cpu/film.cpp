@@ -1,0 +1,304 @@
+#include "cpu/film.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+namespace luch::cpu {
+namespace {
+
+enum Group : u8 { NEITHER, LIGHT_PASS, DATA_PASS };
+
+// Every pass of fixed name: one line each.
+struct Known {
+    const char* name;
+    u32 channels;
+    PassKind kind;
+    u32 FilmLayout::* channel;
+    u32 FilmLayout::* divisor;  // of the colour that is divided out
+    Group group;
+};
+
+constexpr u32 FilmLayout::* nothing = nullptr;
+const Known known_passes[] = {
+    {"Depth", 1, PassKind::DEPTH, &FilmLayout::depth, nothing, DATA_PASS},
+    {"Mist", 1, PassKind::MIST, &FilmLayout::mist, nothing, DATA_PASS},
+    {"Position", 3, PassKind::FIRST, &FilmLayout::position, nothing, DATA_PASS},
+    {"Normal", 3, PassKind::MEAN, &FilmLayout::normal, nothing, DATA_PASS},
+    {"UV", 3, PassKind::MEAN, &FilmLayout::uv, nothing, DATA_PASS},
+    {"Object Index", 1, PassKind::FIRST, &FilmLayout::object_index, nothing, DATA_PASS},
+    {"Material Index", 1, PassKind::FIRST, &FilmLayout::material_index, nothing, DATA_PASS},
+    {"Emission", 3, PassKind::LIGHT, &FilmLayout::emission, nothing, LIGHT_PASS},
+    {"Environment", 3, PassKind::LIGHT, &FilmLayout::environment, nothing, LIGHT_PASS},
+    {"Ambient Occlusion", 3, PassKind::MEAN, &FilmLayout::ambient_occlusion, nothing, LIGHT_PASS},
+    {"Diffuse Direct", 3, PassKind::DIVIDED_LIGHT, &FilmLayout::diffuse_direct, &FilmLayout::diffuse_color, LIGHT_PASS},
+    {"Diffuse Indirect", 3, PassKind::DIVIDED_LIGHT, &FilmLayout::diffuse_indirect, &FilmLayout::diffuse_color,
+     LIGHT_PASS},
+    {"Diffuse Color", 3, PassKind::MEAN, &FilmLayout::diffuse_color, nothing, DATA_PASS},
+    {"Glossy Direct", 3, PassKind::DIVIDED_LIGHT, &FilmLayout::glossy_direct, &FilmLayout::glossy_color, LIGHT_PASS},
+    {"Glossy Indirect", 3, PassKind::DIVIDED_LIGHT, &FilmLayout::glossy_indirect, &FilmLayout::glossy_color,
+     LIGHT_PASS},
+    {"Glossy Color", 3, PassKind::MEAN, &FilmLayout::glossy_color, nothing, DATA_PASS},
+    {"Transmission Direct", 3, PassKind::DIVIDED_LIGHT, &FilmLayout::transmission_direct,
+     &FilmLayout::transmission_color, LIGHT_PASS},
+    {"Transmission Indirect", 3, PassKind::DIVIDED_LIGHT, &FilmLayout::transmission_indirect,
+     &FilmLayout::transmission_color, LIGHT_PASS},
+    {"Transmission Color", 3, PassKind::MEAN, &FilmLayout::transmission_color, nothing, DATA_PASS},
+    {"Denoising Albedo", 3, PassKind::MEAN, &FilmLayout::denoising_albedo, nothing, DATA_PASS},
+    {"Denoising Normal", 3, PassKind::MEAN, &FilmLayout::denoising_normal, nothing, DATA_PASS},
+    {"Denoising Depth", 1, PassKind::MEAN, &FilmLayout::denoising_depth, nothing, DATA_PASS},
+};
+
+struct KnownCrypto {
+    const char* prefix;
+    u32 FilmLayout::* channel;
+};
+const KnownCrypto known_cryptos[] = {
+    {"CryptoObject", &FilmLayout::crypto_object},
+    {"CryptoMaterial", &FilmLayout::crypto_material},
+    {"CryptoAsset", &FilmLayout::crypto_asset},
+};
+
+// Hands out channels and passes in the order in which they are asked for.
+class LayoutBuilder {
+ public:
+    explicit LayoutBuilder(const FilmSpec& spec) : spec_(spec) {
+        for (const Known& known : known_passes) layout.*known.channel = NONE;
+        for (const KnownCrypto& crypto : known_cryptos) layout.*crypto.channel = NONE;
+        layout.half = layout.lightgroups = layout.aovs = NONE;
+        layout.combined = take(4);
+        passes.push_back({"Combined", 4, PassKind::COMBINED, layout.combined});
+        if (spec.halves) {
+            layout.half = take(4);
+            passes.push_back({"Combined Half", 3, PassKind::HALF, layout.half});
+        }
+        layout.crypto_slots = 2u * ((std::clamp(spec.cryptomatte_depth, 1u, 16u) + 1u) / 2u);
+    }
+
+    void add(const std::string& name) {
+        if (std::any_of(passes.begin(), passes.end(), [&](const Pass& pass) { return pass.name == name; })) return;
+        if (name == "Sample Count" || name == "Debug Sample Count") {
+            passes.push_back({name, 1, PassKind::SAMPLE_COUNT, NONE});
+            return;
+        }
+        if (add_known(name) || add_crypto(name) || is_named_elsewhere(name)) return;
+        throw std::invalid_argument("Film: pass \"" + name +
+                                    "\" is not known. Use Blender's names, e.g. \"Diffuse Direct\".");
+    }
+
+    void add_lightgroups() {
+        layout.lightgroup_count = static_cast<u32>(spec_.lightgroups.size());
+        if (spec_.lightgroups.empty()) return;
+        layout.lightgroups = take(3 * layout.lightgroup_count);
+        layout.any_light_pass = 1;
+        for (u32 i = 0; i < layout.lightgroup_count; ++i)
+            passes.push_back({"Combined_" + spec_.lightgroups[i], 3, PassKind::LIGHT, layout.lightgroups + 3 * i});
+    }
+
+    void add_aovs() {
+        layout.aov_count = static_cast<u32>(spec_.aovs.size());
+        if (spec_.aovs.empty()) return;
+        layout.aovs = take(4 * layout.aov_count);
+        layout.any_data_pass = 1;
+        for (u32 i = 0; i < layout.aov_count; ++i)
+            passes.push_back({spec_.aovs[i].name, spec_.aovs[i].color ? 4u : 1u, PassKind::MEAN, layout.aovs + 4 * i});
+    }
+
+    FilmLayout layout{};
+    std::vector<Pass> passes;
+
+ private:
+    u32 take(u32 channels) {
+        u32 first = layout.stride;
+        layout.stride += channels;
+        return first;
+    }
+
+    bool add_known(const std::string& name) {
+        for (const Known& known : known_passes) {
+            if (name != known.name) continue;
+            if (layout.*known.channel == NONE) layout.*known.channel = take(known.channels);
+            u32 divisor = NONE;
+            if (known.divisor) {
+                if (layout.*known.divisor == NONE) layout.*known.divisor = take(3);  // summed, though not shown
+                divisor = layout.*known.divisor;
+                layout.any_data_pass = 1;
+            }
+            (known.group == LIGHT_PASS ? layout.any_light_pass : layout.any_data_pass) = 1;
+            passes.push_back({name, known.channels, known.kind, layout.*known.channel, divisor});
+            return true;
+        }
+        return false;
+    }
+
+    // "CryptoObject" or "CryptoObject00": all layers of that cryptomatte, two slots each.
+    bool add_crypto(const std::string& name) {
+        for (const KnownCrypto& crypto : known_cryptos) {
+            std::string prefix = crypto.prefix;
+            if (name.compare(0, prefix.size(), prefix) != 0) continue;
+            if (name.size() > prefix.size() + 2 ||
+                name.find_first_not_of("0123456789", prefix.size()) != std::string::npos)
+                continue;
+            if (layout.*crypto.channel != NONE) return true;
+            layout.*crypto.channel = take(2 * layout.crypto_slots);
+            layout.any_data_pass = 1;
+            for (u32 layer = 0; layer < layout.crypto_slots / 2; ++layer) {
+                const char number[] = {'0', static_cast<char>('0' + layer), '\0'};  // at most 8 layers
+                passes.push_back({prefix + number, 4, PassKind::CRYPTO, layout.*crypto.channel, NONE, layer});
+            }
+            return true;
+        }
+        return false;
+    }
+
+    // Names of light groups and AOVs are kept in their own lists; a list of passes may repeat them.
+    bool is_named_elsewhere(const std::string& name) const {
+        for (const std::string& group : spec_.lightgroups)
+            if (name == "Combined_" + group) return true;
+        for (const FilmSpec::Aov& aov : spec_.aovs)
+            if (name == aov.name) return true;
+        return false;
+    }
+
+    const FilmSpec& spec_;
+};
+
+// A double as the nearest float, without turning a large finite sum into an infinity.
+float to_float(double x) {
+    constexpr double biggest = std::numeric_limits<float>::max();
+    return static_cast<float>(std::clamp(x, -biggest, biggest));
+}
+
+// Light over colour. Where the colour has no red (green, blue), the others speak for it.
+void divide_color(const FilmSum* light, const FilmSum* color, double scale, float* out) {
+    double sum = 0.0;
+    int defined = 0;
+    for (int k = 0; k < 3; ++k) {
+        if (color[k] == 0.0) continue;
+        sum += light[k] / color[k];
+        ++defined;
+    }
+    double others = defined ? sum / defined : 0.0;
+    for (int k = 0; k < 3; ++k) out[k] = to_float(scale * (color[k] != 0.0 ? light[k] / color[k] : others));
+}
+
+// The pixel's slots by falling weight (by id where equal), of which the layer holds two.
+void read_crypto(const FilmSum* slots, u32 slot_count, u32 layer, double scale, float* out) {
+    std::pair<double, double> by_weight[16];  // weight, id
+    for (u32 i = 0; i < slot_count; ++i) by_weight[i] = {-slots[2 * i + 1], slots[2 * i]};
+    std::sort(by_weight, by_weight + slot_count);
+    for (u32 i = 0; i < 2; ++i) {
+        out[2 * i] = static_cast<float>(by_weight[2 * layer + i].second);
+        out[2 * i + 1] = to_float(-by_weight[2 * layer + i].first * scale);
+    }
+}
+
+void read_pixel(const Pass& pass, const FilmSum* row, const FilmLayout& layout, u32 samples, double exposure,
+                float* out) {
+    double mean = 1.0 / samples;
+    const FilmSum* from = row + pass.channel;
+    switch (pass.kind) {
+        case PassKind::COMBINED:
+            for (int k = 0; k < 3; ++k) out[k] = to_float(from[k] * mean * exposure);
+            out[3] = to_float(std::clamp(1.0 - from[3] * mean, 0.0, 1.0));
+            break;
+        case PassKind::LIGHT:
+            for (u32 k = 0; k < pass.channels; ++k) out[k] = to_float(from[k] * mean * exposure);
+            break;
+        case PassKind::DIVIDED_LIGHT:
+            divide_color(from, row + pass.divisor, exposure, out);
+            break;
+        case PassKind::MEAN:
+            for (u32 k = 0; k < pass.channels; ++k) out[k] = to_float(from[k] * mean);
+            break;
+        case PassKind::FIRST:
+            for (u32 k = 0; k < pass.channels; ++k) out[k] = to_float(from[k]);
+            break;
+        case PassKind::DEPTH:
+            out[0] = from[0] == 0.0 ? 1e10f : to_float(from[0]);
+            break;
+        case PassKind::MIST:
+            out[0] = to_float(std::clamp(1.0 - from[0] * mean, 0.0, 1.0));
+            break;
+        case PassKind::SAMPLE_COUNT:
+            out[0] = static_cast<float>(samples);
+            break;
+        case PassKind::CRYPTO:
+            read_crypto(from, layout.crypto_slots, pass.layer, mean, out);
+            break;
+        case PassKind::HALF:
+            for (int k = 0; k < 3; ++k) out[k] = from[3] > 0.0 ? to_float(from[k] / from[3] * exposure) : 0.0f;
+            break;
+    }
+}
+
+}  // namespace
+
+Film::Film(const FilmSpec& spec) : spec_(spec) {
+    if (spec.width == 0 || spec.height == 0)
+        throw std::invalid_argument("Film: the rendered region is empty. Give it at least one pixel.");
+    LayoutBuilder builder(spec);
+    for (const std::string& name : spec.passes) builder.add(name);
+    builder.add_lightgroups();
+    builder.add_aovs();
+    layout_ = builder.layout;
+    passes_ = std::move(builder.passes);
+    u64 pixels = static_cast<u64>(spec.width) * spec.height;
+    if (pixels >= NONE) throw std::invalid_argument("Film: more than 2^32 pixels. Render it in parts, with a border.");
+    rows_.assign(pixels * layout_.stride, 0.0);
+    counts_.assign(pixels, 0);
+}
+
+FilmView Film::view() {
+    FilmView view{};
+    view.rows = rows_.data();
+    view.sample_counts = counts_.data();
+    view.layout = layout_;
+    view.width = spec_.width, view.height = spec_.height;
+    view.x0 = spec_.x0, view.y0 = spec_.y0;
+    for (int k = 0; k < 3; ++k) view.origin[k] = spec_.origin[k];
+    return view;
+}
+
+void Film::resolve(const Pass& pass, float* out) const {
+    for (size_t pixel = 0; pixel < counts_.size(); ++pixel, out += pass.channels) {
+        if (counts_[pixel] == 0) {
+            std::fill(out, out + pass.channels, 0.0f);
+            continue;
+        }
+        read_pixel(pass, rows_.data() + pixel * layout_.stride, layout_, counts_[pixel], spec_.exposure, out);
+    }
+}
+
+void Film::merge(const Film& other) {
+    if (other.rows_.size() != rows_.size() || other.passes_.size() != passes_.size())
+        throw std::invalid_argument("Film: only films of the same size and passes merge.");
+    std::vector<bool> first_only(layout_.stride, false), crypto(layout_.stride, false);
+    for (const Pass& pass : passes_) {
+        bool first = pass.kind == PassKind::FIRST || pass.kind == PassKind::DEPTH;
+        for (u32 k = 0; first && k < pass.channels; ++k) first_only[pass.channel + k] = true;
+        for (u32 k = 0; pass.kind == PassKind::CRYPTO && k < 2 * layout_.crypto_slots; ++k)
+            crypto[pass.channel + k] = true;
+    }
+    FilmWriter writer{view(), 0};
+    for (size_t pixel = 0; pixel < counts_.size(); ++pixel) {
+        FilmSum* to = rows_.data() + pixel * layout_.stride;
+        const FilmSum* from = other.rows_.data() + pixel * layout_.stride;
+        for (u32 c = 0; c < layout_.stride; ++c) {
+            if (first_only[c]) {
+                if (counts_[pixel] == 0) to[c] = from[c];
+            } else if (!crypto[c]) {
+                to[c] += from[c];
+            }
+        }
+        for (u32 channel : {layout_.crypto_object, layout_.crypto_material, layout_.crypto_asset}) {
+            if (channel == NONE) continue;
+            for (u32 i = 0; i < layout_.crypto_slots; ++i)
+                film_add_crypto(writer, static_cast<u32>(pixel), channel, static_cast<float>(from[channel + 2 * i]),
+                                static_cast<float>(from[channel + 2 * i + 1]));
+        }
+        counts_[pixel] += other.counts_[pixel];
+    }
+}
+
+}  // namespace luch::cpu

@@ -1,0 +1,79 @@
+// Owns the film's memory and reads passes out of it.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "luch/film/film.h"
+
+namespace luch::cpu {
+
+// Fields as in luch.scene.Film.
+struct FilmSpec {
+    u32 width = 0, height = 0;  // of the rendered region: the frame, or its border
+    u32 x0 = 0, y0 = 0;         // bottom left corner of the region in the frame
+    double origin[3] = {0, 0, 0};
+    float exposure = 1.0f;
+    std::vector<std::string> passes;
+    u32 cryptomatte_depth = 6;
+    std::vector<std::string> lightgroups;
+    struct Aov {
+        std::string name;
+        bool color;
+    };
+    std::vector<Aov> aovs;
+    bool halves = false;  // keep a second sum of Combined for an error estimate
+};
+
+// How a pass is read from its row.
+enum class PassKind : u8 {
+    COMBINED,      // mean; exposure on colour; alpha from transparency
+    LIGHT,         // mean, exposure
+    DIVIDED_LIGHT, // divided by the colour pass, exposure
+    MEAN,          // mean
+    FIRST,         // as it is
+    DEPTH,         // as it is, 0 becomes 1e10
+    MIST,          // 1 - mean
+    SAMPLE_COUNT,
+    CRYPTO,        // ids as they are, mean weights, sorted by weight
+    HALF,          // mean over the other half's samples, exposure
+};
+
+struct Pass {
+    std::string name;  // Blender's
+    u32 channels;      // of the result
+    PassKind kind;
+    u32 channel;       // in the row
+    u32 divisor = NONE;  // DIVIDED_LIGHT: channel of the colour pass
+    u32 layer = 0;       // CRYPTO: which pair of slots
+};
+
+class Film {
+ public:
+    // Throws std::invalid_argument that names a pass which is not known or a size that cannot be.
+    explicit Film(const FilmSpec& spec);
+
+    FilmView view();
+    const std::vector<Pass>& passes() const { return passes_; }  // Combined first
+    u32 width() const { return spec_.width; }
+    u32 height() const { return spec_.height; }
+
+    // Writes height * width * pass.channels floats, bottom row first. Pixels without samples are 0.
+    void resolve(const Pass& pass, float* out) const;
+
+    // Adds what another film of the same layout holds, e.g. other samples of the same picture. What the
+    // first sample sees is kept where this film has samples.
+    void merge(const Film& other);
+
+    // Raw rows, for sending a film elsewhere: width * height * stride sums, then the counts.
+    const std::vector<FilmSum>& rows() const { return rows_; }
+    const std::vector<u32>& sample_counts() const { return counts_; }
+
+ private:
+    FilmSpec spec_;
+    FilmLayout layout_;
+    std::vector<Pass> passes_;
+    std::vector<FilmSum> rows_;
+    std::vector<u32> counts_;
+};
+
+}  // namespace luch::cpu

@@ -1,0 +1,146 @@
+// The film: per pixel one row of sums, which the passes of a render are read from at the end.
+//
+// Sums are double, so that 2^20 samples lose nothing; who renders a pixel adds to its row directly
+// (a tile of rows stays in the first-level cache). A row belongs to one worker at a time, so results
+// do not depend on the number of threads as long as the order within a pixel does not.
+#pragma once
+#include "luch/math/vec.h"
+
+namespace luch {
+
+using FilmSum = double;
+
+// Where each pass starts in a pixel's row, in channels; NONE: the render does not ask for it.
+struct FilmLayout {
+    u32 stride;    // channels of a row
+    u32 combined;  // r, g, b, transparency (1 - alpha)
+    u32 half;      // r, g, b and count of the samples that are told to belong to the other half
+    u32 depth, position, object_index, material_index;   // of the pixel's first sample
+    u32 mist, normal, uv;                                // mist: sum of 1 - mist
+    u32 emission, environment, ambient_occlusion;
+    u32 diffuse_direct, diffuse_indirect, diffuse_color;
+    u32 glossy_direct, glossy_indirect, glossy_color;
+    u32 transmission_direct, transmission_indirect, transmission_color;
+    u32 denoising_albedo, denoising_normal, denoising_depth;
+    u32 lightgroups;  // 3 per light group
+    u32 aovs;         // 4 per AOV, a value in the first
+    u32 crypto_object, crypto_material, crypto_asset;  // pairs of id and weight
+    u32 lightgroup_count, aov_count, crypto_slots;
+    // What a path need not look for: light passes (direct, indirect, emission, environment, AO, light
+    // groups) and what is written at the first opaque surface (all data passes, AOVs, cryptomatte).
+    u32 any_light_pass, any_data_pass;
+};
+
+struct FilmView {
+    FilmSum* rows;       // [pixel * stride + channel]; pixels of the rendered region, bottom row first
+    u32* sample_counts;  // per pixel
+    FilmLayout layout;
+    u32 width, height;   // of the rendered region
+    u32 x0, y0;          // its bottom left corner in the full frame
+    FilmSum origin[3];   // Scene.origin: added to the Position pass
+};
+
+// What one worker holds. Values that are not finite never enter; they are counted.
+struct FilmWriter {
+    FilmView film;
+    u64 rejected;
+};
+
+// x - x is 0 for finite values and NaN for the others; one test for a whole colour.
+LUCH_FN bool all_finite(Color c) { return (c.x - c.x) + (c.y - c.y) + (c.z - c.z) == 0.0f; }
+
+LUCH_FN FilmSum* film_row(const FilmView& film, u32 pixel) {
+    return film.rows + static_cast<u64>(pixel) * film.layout.stride;
+}
+
+// Adds to a pass; channel is one of the layout's, NONE adds nothing.
+LUCH_FN void film_add(FilmWriter& writer, u32 pixel, u32 channel, float value) {
+    if (channel == NONE) return;
+    if (!finite_f(value)) {
+        ++writer.rejected;
+        return;
+    }
+    film_row(writer.film, pixel)[channel] += value;
+}
+
+LUCH_FN void film_add(FilmWriter& writer, u32 pixel, u32 channel, Color value) {
+    if (channel == NONE) return;
+    if (!all_finite(value)) {
+        ++writer.rejected;
+        return;
+    }
+    FilmSum* to = film_row(writer.film, pixel) + channel;
+    to[0] += value.x;
+    to[1] += value.y;
+    to[2] += value.z;
+}
+
+// other_half: the sample belongs to the second of two independently scrambled halves, whose
+// difference estimates the error.
+LUCH_FN void film_add_combined(FilmWriter& writer, u32 pixel, bool other_half, Color value) {
+    film_add(writer, pixel, writer.film.layout.combined, value);
+    if (other_half) film_add(writer, pixel, writer.film.layout.half, value);
+}
+
+// 1 - alpha of a path: its throughput where it leaves through a transparent film or a holdout.
+LUCH_FN void film_add_transparency(FilmWriter& writer, u32 pixel, float value) {
+    film_add(writer, pixel, writer.film.layout.combined + 3u, value);
+}
+
+LUCH_FN void film_add_lightgroup(FilmWriter& writer, u32 pixel, u32 group, Color value) {
+    if (writer.film.layout.lightgroups != NONE)
+        film_add(writer, pixel, writer.film.layout.lightgroups + 3u * group, value);
+}
+
+LUCH_FN void film_add_aov_color(FilmWriter& writer, u32 pixel, u32 aov, Color value, float alpha) {
+    u32 channel = writer.film.layout.aovs + 4u * aov;
+    film_add(writer, pixel, channel, value);
+    film_add(writer, pixel, channel + 3u, alpha);
+}
+
+LUCH_FN void film_add_aov_value(FilmWriter& writer, u32 pixel, u32 aov, float value) {
+    film_add(writer, pixel, writer.film.layout.aovs + 4u * aov, value);
+}
+
+// What a pixel's first sample sees: overwritten at every surface until one counts as opaque, and by
+// film_set_background where the path leaves the scene before that.
+LUCH_FN void film_set(FilmWriter& writer, u32 pixel, u32 channel, float value) {
+    if (channel != NONE && finite_f(value)) film_row(writer.film, pixel)[channel] = value;
+}
+
+LUCH_FN void film_set_position(FilmWriter& writer, u32 pixel, Vec3 p) {
+    const FilmView& film = writer.film;
+    if (film.layout.position == NONE || !all_finite(p)) return;
+    FilmSum* to = film_row(film, pixel) + film.layout.position;
+    to[0] = film.origin[0] + p.x;
+    to[1] = film.origin[1] + p.y;
+    to[2] = film.origin[2] + p.z;
+}
+
+LUCH_FN void film_set_background(FilmWriter& writer, u32 pixel) {
+    const FilmLayout& layout = writer.film.layout;
+    FilmSum* row = film_row(writer.film, pixel);
+    if (layout.depth != NONE) row[layout.depth] = 0;
+    if (layout.object_index != NONE) row[layout.object_index] = 0;
+    if (layout.material_index != NONE) row[layout.material_index] = 0;
+    if (layout.position != NONE) row[layout.position] = row[layout.position + 1] = row[layout.position + 2] = 0;
+}
+
+// Adds weight to the id's slot of a cryptomatte (channel: one of the layout's crypto_*). When more ids
+// meet in a pixel than there are slots, the last slot takes the rest, as Cycles has it.
+LUCH_FN void film_add_crypto(FilmWriter& writer, u32 pixel, u32 channel, float id, float weight) {
+    if (channel == NONE || !(weight > 0.0f) || !finite_f(weight)) return;
+    FilmSum* slot = film_row(writer.film, pixel) + channel;
+    u32 last = writer.film.layout.crypto_slots - 1u;
+    for (u32 i = 0; i < last && slot[1] != 0 && slot[0] != id; ++i) slot += 2;
+    if (slot[1] == 0) slot[0] = id;
+    slot[1] += weight;
+}
+
+LUCH_FN void film_count_samples(FilmWriter& writer, u32 pixel, bool other_half, u32 samples) {
+    writer.film.sample_counts[pixel] += samples;
+    if (other_half && writer.film.layout.half != NONE)
+        film_row(writer.film, pixel)[writer.film.layout.half + 3u] += samples;
+}
+
+}  // namespace luch
