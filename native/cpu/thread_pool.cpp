@@ -30,7 +30,8 @@ struct ThreadPool::Shared {
     std::condition_variable start, finished;
     std::vector<std::thread> threads;
     u64 job = 0;          // counts jobs; a change wakes the workers
-    unsigned running = 0;  // workers still inside the present job
+    bool open = false;     // the present job still takes workers
+    unsigned running = 0;  // workers inside it
     bool stop = false;
 
     Chunk chunk = nullptr;
@@ -63,6 +64,8 @@ struct ThreadPool::Shared {
                 start.wait(lock, [&] { return stop || job != seen; });
                 if (stop) return;
                 seen = job;
+                if (!open) continue;  // woken too late: the others have done it all
+                ++running;
             }
             work(worker);
             std::lock_guard lock(mutex);
@@ -104,13 +107,14 @@ void ThreadPool::run(size_t count, size_t grain, Chunk chunk, void* context) {
     bool alone = s.threads.empty() || count <= grain;
     if (!alone) {
         std::lock_guard lock(s.mutex);
-        s.running = static_cast<unsigned>(s.threads.size());
+        s.open = true;
         ++s.job;
     }
     if (!alone) s.start.notify_all();
     s.work(0);
     if (!alone) {
         std::unique_lock lock(s.mutex);
+        s.open = false;
         s.finished.wait(lock, [&] { return s.running == 0; });
     }
     if (s.error) std::rethrow_exception(s.error);

@@ -1,0 +1,287 @@
+// Two levels: groups of triangles, and entries that put a group into the world.
+#include "cpu/accel/accel.h"
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <string>
+
+#include "cpu/accel/build_bvh8.h"
+#include "cpu/accel/group.h"
+#include "cpu/accel/traverse.h"
+
+namespace luch::cpu {
+namespace {
+
+constexpr float LARGEST = 3.402823466e+38f;
+// A mesh with one user, or so small that its copies weigh little, is taken to the world: no transform per
+// ray, no overlapping boxes. One tree holds all such instances of equal visibility.
+constexpr u64 FLATTEN_TRIANGLES = 4096;
+// Groups below this size are built side by side, one thread each.
+constexpr u32 SMALL_GROUP_REFS = 65536;
+
+struct Entry {
+    Affine to_object;
+    u32 group;
+    u32 instance;    // NONE: the group is in world space
+    u32 visibility;  // RayKind bits
+};
+
+// How far a ray seen through an instance may differ from the ray in the world, at a point of size p: the
+// origin and direction round in the transform, and to_object is only nearly the inverse of to_world. With
+// C = |to_world| |to_object| (largest row sum of the linear parts) each is at most gamma(3) C |p|; three of
+// them, doubled for second order terms.
+constexpr float INSTANCE_ERROR = 18.0f * EPS;
+constexpr float CONDITION_LIMIT = 1000.0f;  // worse instances get wider boxes instead of widening every ray
+
+float row_sum(const Affine& a, int row) {
+    return abs_f(a.m[4 * row]) + abs_f(a.m[4 * row + 1]) + abs_f(a.m[4 * row + 2]);
+}
+float condition(const InstanceView& instance) {
+    float world = 0.0f, object = 0.0f;
+    for (int row = 0; row < 3; ++row) {
+        world = max_f(row_sum(instance.to_world, row), world);
+        object = max_f(row_sum(instance.to_object, row), object);
+    }
+    return world * object;
+}
+bool is_finite(const Affine& a) {
+    return std::all_of(std::begin(a.m), std::end(a.m), [](float x) { return finite_f(x); });
+}
+
+Box world_box(const Affine& to_world, const Box& box) {
+    Box out = empty_box();
+    for (int corner = 0; corner < 8; ++corner)
+        extend(out, transform_point(to_world, {corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y,
+                                               corner & 4 ? box.hi.z : box.lo.z}));
+    return out;
+}
+float size_of(const Box& box) { return max_f(max_component(abs_v(box.lo)), max_component(abs_v(box.hi))); }
+
+class TwoLevel final : public Accel {
+  public:
+    TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool, AccelKind kind);
+    void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const override;
+    void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const override;
+    AccelStats stats() const override { return stats_; }
+
+  private:
+    void plan(const SceneView& scene);
+    void add_entry(const SceneView& scene, u32 instance, u32 group);
+    void build_groups(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
+                      bool with_tree);
+    void build_top(const SceneView& scene, ThreadPool& pool);
+    void count();
+    NodeRay top_ray(Vec3 origin, Vec3 direction, float t_min) const;
+    void closest_in_entry(const Entry& entry, const Ray& ray, Hit* hit) const;
+    u8 any_in_entry(const Entry& entry, const Ray& ray) const;
+    Hit closest_one(const Ray& ray, u32 kinds) const;
+    u8 any_one(const Ray& ray, u32 kinds) const;
+
+    std::vector<Group> groups_;
+    std::vector<Entry> entries_;
+    HugeArray<Node8> top_;  // none: the entries are few, or this is brute force
+    Box root_;
+    float top_error_scale_ = 0.0f, top_size_ = 0.0f;
+    AccelStats stats_;
+};
+
+TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
+                   AccelKind kind) {
+    auto start = std::chrono::steady_clock::now();
+    if (!flags.empty() && flags.size() != scene.mesh_count)
+        throw std::invalid_argument("triangle_flags lists " + std::to_string(flags.size()) + " meshes, the scene has " +
+                                    std::to_string(scene.mesh_count) + ".");
+    plan(scene);
+    build_groups(scene, flags, pool, kind == AccelKind::BVH);
+    if (kind == AccelKind::BVH && entries_.size() > 1) build_top(scene, pool);
+    count();
+    stats_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Decides which instances are taken to the world, and lists groups and entries.
+void TwoLevel::plan(const SceneView& scene) {
+    std::vector<u32> users(scene.mesh_count), group_of_mesh(scene.mesh_count, NONE);
+    for (u32 i = 0; i < scene.instance_count; ++i) ++users[scene.instances[i].mesh];
+    std::vector<std::pair<u32, u32>> flat;  // visibility, group
+    std::vector<u64> flat_refs;             // of each such group
+    for (u32 i = 0; i < scene.instance_count; ++i) {
+        const InstanceView& instance = scene.instances[i];
+        u32 triangles = scene.meshes[instance.mesh].triangle_count;
+        if (instance.visibility == 0 || triangles == 0) continue;
+        if (users[instance.mesh] > 1 && u64(users[instance.mesh]) * triangles > FLATTEN_TRIANGLES) {
+            u32& group = group_of_mesh[instance.mesh];
+            if (group == NONE) {
+                group = u32(groups_.size());
+                groups_.emplace_back().members = {{instance.mesh, NONE, 0}};
+            }
+            add_entry(scene, i, group);
+            continue;
+        }
+        size_t f = 0;
+        while (f < flat.size() && (flat[f].first != instance.visibility || flat_refs[f] + triangles > REF_MASK / 2)) ++f;
+        if (f == flat.size()) {
+            flat.push_back({instance.visibility, u32(groups_.size())});
+            flat_refs.push_back(0);
+            groups_.emplace_back();
+            entries_.push_back({{}, flat[f].second, NONE, instance.visibility});
+        }
+        groups_[flat[f].second].members.push_back({instance.mesh, i, u32(flat_refs[f])});
+        flat_refs[f] += triangles;
+    }
+}
+
+void TwoLevel::add_entry(const SceneView& scene, u32 i, u32 group) {
+    const InstanceView& instance = scene.instances[i];
+    if (!is_finite(instance.to_world) || !is_finite(instance.to_object)) {
+        stats_.dropped_triangles += scene.meshes[instance.mesh].triangle_count;
+        return;
+    }
+    entries_.push_back({instance.to_object, group, i, instance.visibility});
+}
+
+void TwoLevel::build_groups(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
+                            bool with_tree) {
+    std::vector<u32> small;
+    for (u32 g = 0; g < groups_.size(); ++g) {
+        const Member& last = groups_[g].members.back();
+        if (last.first_ref + scene.meshes[last.mesh].triangle_count < SMALL_GROUP_REFS)
+            small.push_back(g);
+        else
+            build_group(groups_[g], scene, flags, with_tree, pool);
+    }
+    pool.parallel_for(small.size(), 1, [&](size_t begin, size_t end, unsigned) {
+        for (size_t i = begin; i < end; ++i) build_group(groups_[small[i]], scene, flags, with_tree, pool);
+    });
+    std::erase_if(entries_, [this](const Entry& entry) { return groups_[entry.group].triangles == 0; });
+}
+
+void TwoLevel::build_top(const SceneView& scene, ThreadPool& pool) {
+    std::vector<Box> boxes(entries_.size());
+    for (size_t i = 0; i < entries_.size(); ++i) {
+        const Entry& entry = entries_[i];
+        const Box& box = groups_[entry.group].root;
+        boxes[i] = entry.instance == NONE ? box : world_box(scene.instances[entry.instance].to_world, box);
+        top_size_ = max_f(size_of(boxes[i]), top_size_);
+        if (entry.instance == NONE) continue;
+        const Affine& m = scene.instances[entry.instance].to_world;
+        for (int row = 0; row < 3; ++row) top_size_ = max_f(abs_f(m.m[4 * row + 3]), top_size_);
+    }
+    HugeArray<PrimBox> prims(entries_.size());
+    for (size_t i = 0; i < entries_.size(); ++i) {
+        float wider = 0.0f, c = entries_[i].instance == NONE ? 1.0f : condition(scene.instances[entries_[i].instance]);
+        if (c > CONDITION_LIMIT)
+            wider = INSTANCE_ERROR * c * 4.0f * top_size_;  // for origins within thrice the scene's size
+        else
+            top_error_scale_ = max_f(INSTANCE_ERROR * c, top_error_scale_);
+        Vec3 lo = boxes[i].lo - make_vec3(wider), hi = boxes[i].hi + make_vec3(wider);
+        prims[i] = {{-lo.x, -lo.y, -lo.z}, u32(i), {hi.x, hi.y, hi.z}, 0};
+    }
+    Tree8 tree = build_bvh8(std::move(prims), entries_.size(), 1, pool);
+    top_ = std::move(tree.nodes);
+    root_ = tree.root;
+    for (size_t n = 0; n < top_.size(); ++n)
+        for (int slot = 0; slot < 8; ++slot) {
+            u32 items = top_[n].count[slot];
+            if (items) top_[n].child[slot] |= LEAF | ((items - 1) << LEAF_COUNT_SHIFT);
+        }
+    std::vector<Entry> sorted(entries_.size());
+    for (size_t i = 0; i < entries_.size(); ++i) sorted[i] = entries_[tree.order[i]];
+    entries_ = std::move(sorted);
+}
+
+void TwoLevel::count() {
+    stats_.bytes += top_.bytes() + entries_.size() * sizeof(Entry);
+    stats_.nodes += top_.size();
+    for (const Group& group : groups_) {
+        stats_.triangles += group.triangles;
+        stats_.dropped_triangles += group.dropped;
+        stats_.nodes += group.nodes.size();
+        stats_.leaf_blocks += group.blocks.size();
+        stats_.bytes += group.nodes.bytes() + group.blocks.bytes() + group.members.size() * sizeof(Member);
+    }
+}
+
+NodeRay TwoLevel::top_ray(Vec3 origin, Vec3 direction, float t_min) const {
+    float error = top_error_scale_ * (3.0f * max_component(abs_v(origin)) + top_size_);
+    return NodeRay(make_box_ray(make_triangle_ray(origin, direction), direction, root_, error), t_min);
+}
+
+void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) const {
+    Vec3 origin = ray.origin, direction = ray.direction;
+    if (entry.instance != NONE) {
+        origin = transform_point(entry.to_object, origin);
+        direction = transform_direction(entry.to_object, direction);
+        if (!ray_is_valid({origin, 0.0f, direction, LARGEST})) return;
+    }
+    const Group& group = groups_[entry.group];
+    GroupHit hit = {best->t, NONE, 0.0f, 0.0f};
+    closest_in_group(group, origin, direction, ray.t_min, &hit);
+    if (hit.ref == NONE) return;
+    const Member& member = group.member_of(hit.ref);
+    u32 instance = entry.instance == NONE ? member.instance : entry.instance, prim = hit.ref - member.first_ref;
+    bool first_at_t = instance < best->instance || (instance == best->instance && prim < best->prim);
+    if (hit.t < best->t || first_at_t) *best = {hit.t, prim, instance, hit.u, hit.v};
+}
+
+u8 TwoLevel::any_in_entry(const Entry& entry, const Ray& ray) const {
+    if (entry.instance == NONE)
+        return any_in_group(groups_[entry.group], ray.origin, ray.direction, ray.t_min, ray.t_max);
+    Vec3 origin = transform_point(entry.to_object, ray.origin);
+    Vec3 direction = transform_direction(entry.to_object, ray.direction);
+    if (!ray_is_valid({origin, 0.0f, direction, LARGEST})) return BLOCKED_NOT;
+    return any_in_group(groups_[entry.group], origin, direction, ray.t_min, ray.t_max);
+}
+
+Hit TwoLevel::closest_one(const Ray& given, u32 kinds) const {
+    constexpr Hit MISS = {INFINITE_DISTANCE, NONE, NONE, 0.0f, 0.0f};
+    if (!ray_is_valid(given)) return MISS;
+    Ray ray = given;
+    ray.t_min = max_f(ray.t_min, 0.0f);
+    Hit best = {min_f(ray.t_max, LARGEST), NONE, NONE, 0.0f, 0.0f};
+    auto visit = [&](u32 first, u32 count) {
+        for (u32 e = first; e < first + count; ++e)
+            if (entries_[e].visibility & kinds) closest_in_entry(entries_[e], ray, &best);
+    };
+    if (top_.size())
+        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, ray.t_min), &best.t, visit);
+    else
+        visit(0, u32(entries_.size()));
+    return best.prim == NONE ? MISS : best;
+}
+
+u8 TwoLevel::any_one(const Ray& given, u32 kinds) const {
+    if (!ray_is_valid(given)) return BLOCKED_NOT;
+    Ray ray = given;
+    ray.t_min = max_f(ray.t_min, 0.0f);
+    ray.t_max = min_f(ray.t_max, LARGEST);
+    u8 result = BLOCKED_NOT;
+    auto visit = [&](u32 first, u32 count) {
+        for (u32 e = first; e < first + count && result != BLOCKED_OPAQUE; ++e)
+            if (entries_[e].visibility & kinds)
+                if (u8 blocked = any_in_entry(entries_[e], ray)) result = blocked;
+        return result == BLOCKED_OPAQUE;
+    };
+    if (top_.size())
+        visit_any(top_.data(), top_ray(ray.origin, ray.direction, ray.t_min), ray.t_max, visit);
+    else
+        visit(0, u32(entries_.size()));
+    return result;
+}
+
+void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const {
+    for (size_t i = 0; i < count; ++i) hits[i] = closest_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL));
+}
+
+void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const {
+    for (size_t i = 0; i < count; ++i) blocked[i] = any_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL));
+}
+
+}  // namespace
+
+std::unique_ptr<Accel> Accel::build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
+                                    ThreadPool& pool, AccelKind kind) {
+    return std::make_unique<TwoLevel>(scene, triangle_flags, pool, kind);
+}
+
+}  // namespace luch::cpu

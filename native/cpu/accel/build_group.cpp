@@ -1,0 +1,160 @@
+// Gathering a group's triangles, and its tree.
+#include <algorithm>
+#include <atomic>
+#include <stdexcept>
+
+#include "cpu/accel/accel.h"
+#include "cpu/accel/build_bvh8.h"
+#include "cpu/accel/group.h"
+
+namespace luch::cpu {
+namespace {
+
+constexpr size_t GATHER_CHUNK = 16384;  // triangles
+
+struct Corners3 {
+    Vec3 p[3];
+};
+
+// Reads triangles by ref, in the group's space.
+class Gather {
+  public:
+    Gather(const Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags)
+        : group_(group), scene_(scene), flags_(flags) {}
+
+    u32 ref_count() const {
+        const Member& last = group_.members.back();
+        return last.first_ref + scene_.meshes[last.mesh].triangle_count;
+    }
+    // False for a triangle that cannot be traced: an index outside the mesh, a vertex that is not finite.
+    bool read(u32 ref, const Member& member, Corners3* out) const {
+        const MeshView& mesh = scene_.meshes[member.mesh];
+        const u32* indices = scene_.triangles + 3 * (size_t(mesh.first_triangle) + ref - member.first_ref);
+        for (int k = 0; k < 3; ++k) {
+            if (indices[k] >= mesh.vertex_count) return false;
+            const float* p = scene_.positions + 3 * (size_t(mesh.first_vertex) + indices[k]);
+            Vec3 point = {p[0], p[1], p[2]};
+            if (member.instance != NONE) point = transform_point(scene_.instances[member.instance].to_world, point);
+            if (!(max_component(abs_v(point)) <= 1e37f) || !finite_v(point)) return false;
+            out->p[k] = point;
+        }
+        return true;
+    }
+    u32 flagged(u32 ref, const Member& member) const {
+        if (flags_.empty() || flags_[member.mesh].empty()) return ref;
+        u8 flag = flags_[member.mesh][ref - member.first_ref];
+        return flag & TRIANGLE_MAY_BE_TRANSPARENT ? ref | REF_TRANSPARENT : ref;
+    }
+
+  private:
+    const Group& group_;
+    const SceneView& scene_;
+    const std::vector<std::vector<u8>>& flags_;
+};
+
+// The boxes of the triangles kept, in order of ref.
+HugeArray<PrimBox> gather_boxes(const Group& group, const Gather& gather, ThreadPool& pool, size_t* kept) {
+    size_t refs = gather.ref_count();
+    HugeArray<PrimBox> boxes(refs);
+    std::vector<size_t> filled((refs + GATHER_CHUNK - 1) / GATHER_CHUNK);
+    pool.parallel_for(refs, GATHER_CHUNK, [&](size_t begin, size_t end, unsigned) {
+        size_t next = begin;
+        const Member* member = &group.member_of(u32(begin));
+        const Member* last = &group.members.back();
+        for (size_t ref = begin; ref < end; ++ref) {
+            while (member != last && ref >= member[1].first_ref) ++member;
+            Corners3 c;
+            if (!gather.read(u32(ref), *member, &c)) continue;
+            Vec3 lo = min_v(min_v(c.p[0], c.p[1]), c.p[2]), hi = max_v(max_v(c.p[0], c.p[1]), c.p[2]);
+            boxes[next++] = {{-lo.x, -lo.y, -lo.z}, u32(ref), {hi.x, hi.y, hi.z}, 0};
+        }
+        filled[begin / GATHER_CHUNK] = next - begin;
+    });
+    size_t next = filled.empty() ? 0 : filled[0];
+    for (size_t chunk = 1; chunk < filled.size(); ++chunk) {
+        if (next != chunk * GATHER_CHUNK)
+            std::copy_n(boxes.data() + chunk * GATHER_CHUNK, filled[chunk], boxes.data() + next);
+        next += filled[chunk];
+    }
+    *kept = next;
+    return boxes;
+}
+
+void fill_block(Block4& block, const u32* refs, u32 count, const Group& group, const Gather& gather) {
+    const float nan = bits_float(0x7fc00000u);
+    for (u32 lane = 0; lane < 4; ++lane) {
+        Corners3 c;
+        for (Vec3& p : c.p) p = make_vec3(nan);
+        u32 ref = REF_MASK;
+        if (lane < count) {
+            const Member& member = group.member_of(refs[lane]);
+            gather.read(refs[lane], member, &c);
+            ref = gather.flagged(refs[lane], member);
+        }
+        for (int k = 0; k < 3; ++k)
+            for (int axis = 0; axis < 3; ++axis) block.vertex[k][axis][lane] = c.p[k][axis];
+        block.ref[lane] = ref;
+    }
+}
+
+// Turns the builder's leaves (ranges of order) into blocks.
+void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gather, ThreadPool& pool) {
+    std::vector<u32> first_order;  // per block
+    first_order.reserve(order.size() / 3 + 1);
+    std::vector<u8> size;
+    size.reserve(order.size() / 3 + 1);
+    for (size_t n = 0; n < group.nodes.size(); ++n) {
+        Node8& node = group.nodes[n];
+        for (int slot = 0; slot < 8; ++slot) {
+            u32 count = node.count[slot], first = node.child[slot];
+            if (count == 0) continue;
+            u32 blocks = (count + 3) / 4, block = u32(first_order.size());
+            if (block + blocks > LEAF_FIRST_MASK) throw std::length_error("More than a billion triangles in one mesh or scene.");
+            node.child[slot] = LEAF | ((blocks - 1) << LEAF_COUNT_SHIFT) | block;
+            for (u32 b = 0; b < blocks; ++b) {
+                first_order.push_back(first + 4 * b);
+                size.push_back(u8(std::min(4u, count - 4 * b)));
+            }
+        }
+    }
+    group.blocks = HugeArray<Block4>(first_order.size());
+    pool.parallel_for(first_order.size(), GATHER_CHUNK / 4, [&](size_t begin, size_t end, unsigned) {
+        for (size_t b = begin; b < end; ++b)
+            fill_block(group.blocks[b], &order[first_order[b]], size[b], group, gather);
+    });
+}
+
+void make_list(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather) {
+    group.blocks = HugeArray<Block4>((kept + 3) / 4);
+    for (size_t b = 0; b < group.blocks.size(); ++b) {
+        u32 refs[4], count = u32(std::min<size_t>(4, kept - 4 * b));
+        for (u32 lane = 0; lane < count; ++lane) refs[lane] = boxes[4 * b + lane].id;
+        fill_block(group.blocks[b], refs, count, group, gather);
+    }
+}
+
+}  // namespace
+
+const Member& Group::member_of(u32 ref) const {
+    auto after = std::upper_bound(members.begin(), members.end(), ref,
+                                  [](u32 r, const Member& m) { return r < m.first_ref; });
+    return *(after - 1);
+}
+
+void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags, bool with_tree,
+                 ThreadPool& pool) {
+    Gather gather(group, scene, flags);
+    size_t kept = 0;
+    HugeArray<PrimBox> boxes = gather_boxes(group, gather, pool, &kept);
+    group.triangles = kept;
+    group.dropped = gather.ref_count() - kept;
+    group.root = empty_box();
+    if (kept == 0) return;
+    if (!with_tree) return make_list(group, boxes.data(), kept, gather);
+    Tree8 tree = build_bvh8(std::move(boxes), kept, 4, pool);
+    group.nodes = std::move(tree.nodes);
+    group.root = tree.root;
+    make_blocks(group, tree.order, gather, pool);
+}
+
+}  // namespace luch::cpu

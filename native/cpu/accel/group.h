@@ -1,0 +1,44 @@
+// A group: the triangles of one mesh in its own space, or of several instances taken to the world. It has
+// one tree. A triangle's ref is its member's first_ref + its index in the mesh, so refs sort as
+// (instance, prim) do.
+#pragma once
+#include <vector>
+
+#include "cpu/accel/bvh8.h"
+#include "cpu/thread_pool.h"
+#include "luch/shade/scene_view.h"
+
+namespace luch::cpu {
+
+struct Member {
+    u32 mesh;
+    u32 instance;  // NONE: the mesh in its own space
+    u32 first_ref;
+};
+
+struct GroupHit {
+    float t;
+    u32 ref;  // NONE: nothing yet; a hit at exactly t then still counts
+    float u, v;
+};
+
+struct Group {
+    std::vector<Member> members;  // by instance
+    HugeArray<Node8> nodes;       // none: a list of blocks, tested one by one (brute force)
+    HugeArray<Block4> blocks;
+    Box root;
+    u64 triangles = 0, dropped = 0;
+
+    const Member& member_of(u32 ref) const;
+};
+
+// Fills everything but members, which say what to gather. flags: per mesh, per triangle TriangleFlag.
+void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags, bool with_tree,
+                 ThreadPool& pool);
+
+// The ray in the group's space, valid, 0 <= t_min; hit->t its upper end.
+void closest_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_min, GroupHit* hit);
+// A Blocked value.
+u8 any_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_min, float t_max);
+
+}  // namespace luch::cpu

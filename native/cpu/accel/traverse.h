@@ -1,0 +1,177 @@
+// Walking the eight-wide tree with one ray: closest hit and any hit, over a leaf test given as a callable.
+#pragma once
+#include "cpu/accel/bvh8.h"
+#include "cpu/accel/simd.h"
+#include "luch/geometry/box.h"
+#include "luch/geometry/triangle.h"
+
+namespace luch::cpu {
+
+// A ray against the boxes of one tree, spread over lanes.
+struct NodeRay {
+    f8 near_origin[3], far_origin[3], near_rdir[3], far_rdir[3];
+    f8 t_min;
+    u32 near_plane[3], far_plane[3];  // rows of Node8::bounds
+
+    NodeRay(const BoxRay& ray, float t_min_) : t_min(splat<f8>(t_min_)) {
+        for (u32 axis = 0; axis < 3; ++axis) {
+            near_origin[axis] = splat<f8>(ray.near_origin[axis]);
+            far_origin[axis] = splat<f8>(ray.far_origin[axis]);
+            near_rdir[axis] = splat<f8>(ray.near_rdir[axis]);
+            far_rdir[axis] = splat<f8>(ray.far_rdir[axis]);
+            near_plane[axis] = axis + 3 * ray.negative[axis];
+            far_plane[axis] = axis + 3 * (1 - ray.negative[axis]);
+        }
+    }
+};
+
+// Bits of the children that the ray may hit before t_max, and where it enters them.
+LUCH_FN u32 intersect_node(const Node8& node, const NodeRay& r, float t_max, f8* entry) {
+    f8 near_t[3], far_t[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        near_t[axis] = (load<f8>(node.bounds[r.near_plane[axis]]) - r.near_origin[axis]) * r.near_rdir[axis];
+        far_t[axis] = (load<f8>(node.bounds[r.far_plane[axis]]) - r.far_origin[axis]) * r.far_rdir[axis];
+    }
+    // 0 * inf, a ray in a face's plane, is NaN. The order drops it (at worst with its neighbour): the test
+    // then says yes where it need not.
+    f8 enter = max_of(max_of(near_t[0], near_t[1]), max_of(near_t[2], r.t_min));
+    f8 leave = min_of(min_of(far_t[0], far_t[1]), min_of(far_t[2], splat<f8>(t_max)));
+    *entry = enter;
+    return mask_le(enter, leave);
+}
+
+// A ray against triangle blocks: the shear of triangle.h, spread over lanes.
+struct BlockRay {
+    f4 origin[3];  // by shear axis: x, y, z
+    f4 shear_x, shear_y, scale_z;
+    double scale_z_exact;
+    float t_min;
+    int axis[3];
+
+    BlockRay(const TriangleRay& r, float t_min_)
+        : origin{splat<f4>(r.origin[r.kx]), splat<f4>(r.origin[r.ky]), splat<f4>(r.origin[r.kz])},
+          shear_x(splat<f4>(r.shear_x)),
+          shear_y(splat<f4>(r.shear_y)),
+          scale_z(splat<f4>(r.scale_z)),
+          scale_z_exact(r.scale_z_exact),
+          t_min(t_min_),
+          axis{r.kx, r.ky, r.kz} {}
+};
+
+struct BlockHits {
+    alignas(16) float t[4], u[4], v[4];
+};
+
+// Bits of the lanes hit in (t_min, t_max]. The same operations as intersect_triangle, so the same bits; the
+// float pass before them only sorts out lanes that intersect_triangle is sure to refuse.
+LUCH_FN u32 intersect_block(const Block4& block, const BlockRay& r, float t_max, BlockHits* hits) {
+    f4 x[3], y[3], z[3];
+    for (int k = 0; k < 3; ++k) {
+        z[k] = load<f4>(block.vertex[k][r.axis[2]]) - r.origin[2];
+        x[k] = (load<f4>(block.vertex[k][r.axis[0]]) - r.origin[0]) - r.shear_x * z[k];
+        y[k] = (load<f4>(block.vertex[k][r.axis[1]]) - r.origin[1]) - r.shear_y * z[k];
+    }
+    // Rounding is monotone, so a float edge function is zero or has the right sign (or overflowed to NaN).
+    f4 u = x[2] * y[1] - y[2] * x[1];
+    f4 v = x[0] * y[2] - y[0] * x[2];
+    f4 w = x[1] * y[0] - y[1] * x[0];
+    f4 zero = {};
+    u32 outside = mask_lt(min_of(min_of(u, v), w), zero) & mask_lt(zero, max_of(max_of(u, v), w));
+    // t is a weighted mean of the vertices' depths. Empty lanes are NaN and fail here.
+    f4 depth[3] = {z[0] * r.scale_z, z[1] * r.scale_z, z[2] * r.scale_z};
+    f4 nearest = min_of(min_of(depth[0], depth[1]), depth[2]) * splat<f4>(SLAB_DOWN);
+    f4 farthest = max_of(max_of(depth[0], depth[1]), depth[2]) * splat<f4>(SLAB_UP);
+    u32 candidates = mask_le(nearest, splat<f4>(t_max)) & mask_le(splat<f4>(r.t_min), farthest) & ~outside;
+    if (!candidates) return 0;
+
+    d4 dx[3], dy[3], dz[3];
+    for (int k = 0; k < 3; ++k) {
+        dx[k] = __builtin_convertvector(x[k], d4);
+        dy[k] = __builtin_convertvector(y[k], d4);
+        dz[k] = __builtin_convertvector(z[k], d4);
+    }
+    d4 du = dx[2] * dy[1] - dy[2] * dx[1];
+    d4 dv = dx[0] * dy[2] - dy[0] * dx[2];
+    d4 dw = dx[1] * dy[0] - dy[1] * dx[0];
+    d4 none = {};
+    outside = mask_lt(min_of(min_of(du, dv), dw), none) & mask_lt(none, max_of(max_of(du, dv), dw));
+    d4 reciprocal = splat<d4>(1.0) / ((du + dv) + dw);
+    d4 depth_sum = (du * dz[0] + dv * dz[1]) + dw * dz[2];
+    f4 t = __builtin_convertvector((depth_sum * reciprocal) * splat<d4>(r.scale_z_exact), f4);
+    *reinterpret_cast<f4*>(hits->t) = t;
+    *reinterpret_cast<f4*>(hits->u) = __builtin_convertvector(dv * reciprocal, f4);
+    *reinterpret_cast<f4*>(hits->v) = __builtin_convertvector(dw * reciprocal, f4);
+    return candidates & ~outside & mask_lt(splat<f4>(r.t_min), t) & mask_le(t, splat<f4>(t_max));
+}
+
+// Entry distances are never negative, so as integers they sort as they do as floats.
+struct StackEntry {
+    u32 child;
+    float distance;
+};
+
+// Calls leaf(first item, items) nearest leaves first; leaf lowers *t_max when it finds a hit. Boxes entered
+// at exactly t_max are still visited: a hit there may have the smaller id.
+template <class Leaf>
+LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* t_max, Leaf&& leaf) {
+    StackEntry stack[STACK_SIZE];
+    StackEntry* top = stack;
+    u32 current = 0;
+    for (;;) {
+        while (!(current & LEAF)) {
+            const Node8& node = nodes[current];
+            f8 entry;
+            u32 mask = intersect_node(node, ray, *t_max, &entry);
+            if (!mask) goto pop;
+            alignas(32) float distance[8];
+            *reinterpret_cast<f8*>(distance) = entry;
+            u32 i = u32(__builtin_ctz(mask));
+            StackEntry nearest = {node.child[i], distance[i]};
+            StackEntry* own = top;
+            for (mask &= mask - 1; mask; mask &= mask - 1) {
+                i = u32(__builtin_ctz(mask));
+                StackEntry other = {node.child[i], distance[i]};
+                if (other.distance < nearest.distance) {
+                    StackEntry swapped = nearest;
+                    nearest = other;
+                    other = swapped;
+                }
+                StackEntry* place = top++;  // this node's entries stay sorted, nearest on top
+                for (; place > own && place[-1].distance < other.distance; --place) *place = place[-1];
+                *place = other;
+            }
+            current = nearest.child;
+        }
+        leaf(current & LEAF_FIRST_MASK, ((current >> LEAF_COUNT_SHIFT) & (LEAF_MAX_ITEMS - 1)) + 1);
+    pop:
+        do {
+            if (top == stack) return;
+            --top;
+        } while (!(top->distance <= *t_max));
+        current = top->child;
+    }
+}
+
+// Calls leaf(first item, items) in no particular order until it returns true.
+template <class Leaf>
+LUCH_FN void visit_any(const Node8* nodes, const NodeRay& ray, float t_max, Leaf&& leaf) {
+    u32 stack[STACK_SIZE];
+    u32* top = stack;
+    u32 current = 0;
+    for (;;) {
+        while (!(current & LEAF)) {
+            const Node8& node = nodes[current];
+            f8 entry;
+            u32 mask = intersect_node(node, ray, t_max, &entry);
+            if (!mask) goto pop;
+            current = node.child[__builtin_ctz(mask)];
+            for (mask &= mask - 1; mask; mask &= mask - 1) *top++ = node.child[__builtin_ctz(mask)];
+        }
+        if (leaf(current & LEAF_FIRST_MASK, ((current >> LEAF_COUNT_SHIFT) & (LEAF_MAX_ITEMS - 1)) + 1)) return;
+    pop:
+        if (top == stack) return;
+        current = *--top;
+    }
+}
+
+}  // namespace luch::cpu

@@ -1,0 +1,73 @@
+// The watertight triangle test of Woop, Benthin, Wald 2013 ("Watertight Ray/Triangle Intersection"), with
+// the weights of an accepted triangle taken in double: products of two floats are exact there, so signs are
+// exact for the sheared vertices and t, u, v hold their precision on slivers and edge-on triangles too.
+//
+// The hit of a set of triangles is the smallest t in (t_min, t_max]; on equal t the smaller id.
+#pragma once
+#include "luch/geometry/ray.h"
+#include "luch/math/vec.h"
+
+namespace luch {
+
+// A ray in the test's frame: z is the dominant axis of the direction, x and y keep the winding.
+struct TriangleRay {
+    Vec3 origin;
+    int kx, ky, kz;
+    float shear_x, shear_y, scale_z;  // d_x / d_z, d_y / d_z, 1 / d_z
+    double scale_z_exact;             // 1 / d_z for the accepted triangle's t
+};
+
+struct TriangleHit {
+    float t, u, v;
+};
+
+LUCH_FN TriangleRay make_triangle_ray(Vec3 origin, Vec3 direction) {
+    TriangleRay r;
+    Vec3 a = abs_v(direction);
+    r.kz = a.x >= a.y ? (a.x >= a.z ? 0 : 2) : (a.y >= a.z ? 1 : 2);
+    r.kx = r.kz == 2 ? 0 : r.kz + 1;
+    r.ky = r.kx == 2 ? 0 : r.kx + 1;
+    float dz = direction[r.kz];
+    if (dz < 0.0f) {
+        int k = r.kx;
+        r.kx = r.ky;
+        r.ky = k;
+    }
+    r.origin = origin;
+    r.shear_x = direction[r.kx] / dz;
+    r.shear_y = direction[r.ky] / dz;
+    r.scale_z = 1.0f / dz;
+    r.scale_z_exact = 1.0 / double(dz);
+    return r;
+}
+
+// False for rays that can hit nothing: not finite, no direction, an empty or NaN interval.
+LUCH_FN bool ray_is_valid(const Ray& ray) {
+    Vec3 a = abs_v(ray.direction);
+    float largest = max_component(a);
+    return finite_v(ray.origin) && finite_v(ray.direction) && largest >= 1e-37f && largest <= 1e37f &&
+           ray.t_max > 0.0f && ray.t_min < ray.t_max;
+}
+
+// Hits lie in (t_min, t_max]; t_min >= 0, t_max <= the largest float.
+LUCH_FN bool intersect_triangle(const TriangleRay& r, Vec3 p0, Vec3 p1, Vec3 p2, float t_min, float t_max,
+                                TriangleHit* hit) {
+    Vec3 a = p0 - r.origin, b = p1 - r.origin, c = p2 - r.origin;
+    float az = a[r.kz], bz = b[r.kz], cz = c[r.kz];
+    float ax = a[r.kx] - r.shear_x * az, ay = a[r.ky] - r.shear_y * az;
+    float bx = b[r.kx] - r.shear_x * bz, by = b[r.ky] - r.shear_y * bz;
+    float cx = c[r.kx] - r.shear_x * cz, cy = c[r.ky] - r.shear_y * cz;
+    double u = double(cx) * double(by) - double(cy) * double(bx);
+    double v = double(ax) * double(cy) - double(ay) * double(cx);
+    double w = double(bx) * double(ay) - double(by) * double(ax);
+    bool outside = (u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0);
+    if (outside) return false;
+    double reciprocal = 1 / ((u + v) + w);  // infinite for a degenerate triangle: t is NaN
+    double z = (u * double(az) + v * double(bz)) + w * double(cz);
+    float t = float((z * reciprocal) * r.scale_z_exact);
+    if (!(t > t_min && t <= t_max)) return false;  // NaN: miss
+    *hit = {t, float(v * reciprocal), float(w * reciprocal)};
+    return true;
+}
+
+}  // namespace luch
