@@ -12,5 +12,6 @@ void bind_accel(py::module_& m);
 void bind_math(py::module_& m);
 void bind_sampling(py::module_& m);
 void bind_shade(py::module_& m);
+void bind_textures(py::module_& m);
 
 }  // namespace luch::bindings

@@ -8,4 +8,5 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_accel(m);
     luch::bindings::bind_sampling(m);
     luch::bindings::bind_shade(m);
+    luch::bindings::bind_textures(m);
 }

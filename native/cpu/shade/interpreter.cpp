@@ -27,6 +27,11 @@ void run_op(const Run& run, const u32* operands) {
     for (int k = 0; k < inputs; k++) read[k] = run.registers + size_t(operands[outputs + k]) * SHADE_LANES;
     const u32* params = operands + outputs + inputs;
     const int count = run.points->count;
+    // Operations written over packs of lanes (textures/lane_op.h) loop for themselves.
+    if constexpr (requires { &Op::eval_lanes; }) {
+        Op::eval_lanes(params, read, written, count);
+        return;
+    }
     // Lanes are independent: an output may share its register with an input of the same lane only.
 #pragma GCC ivdep
     for (int lane = 0; lane < count; lane++) {
