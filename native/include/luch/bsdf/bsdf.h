@@ -2,6 +2,9 @@
 #pragma once
 #include "luch/bsdf/bump_shadow.h"
 #include "luch/bsdf/diffuse.h"
+#include "luch/bsdf/microfacet.h"
+#include "luch/bsdf/ashikhmin_shirley.h"
+#include "luch/bsdf/sheen.h"
 
 namespace luch {
 
@@ -32,8 +35,15 @@ LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
         case LobeType::DIFFUSE: return eval_diffuse(lobe, wi);
         case LobeType::OREN_NAYAR: return eval_oren_nayar(lobe, wo, wi);
         case LobeType::TRANSLUCENT: return eval_translucent(lobe, wi);
-        default: return {make_vec3(0.0f), 0.0f};
+        case LobeType::SHEEN: return eval_sheen(lobe, wi);
+        case LobeType::ASHIKHMIN_SHEEN: return eval_velvet(lobe, wo, wi);
+        case LobeType::ASHIKHMIN_SHIRLEY: return eval_ashikhmin_shirley(lobe, wo, wi);
+        case LobeType::MICROFACET_REFLECTION:
+        case LobeType::MICROFACET_REFRACTION:
+        case LobeType::MICROFACET_GLASS: return eval_microfacet(lobe, wo, wi);
+        case LobeType::NONE_: break;
     }
+    return no_value();
 }
 
 LUCH_FN LobeValue eval_lobe(const Lobe& lobe, Vec3 n_smooth, Vec3 wo, Vec3 wi) {
@@ -59,26 +69,36 @@ LUCH_FN_SLOW BsdfValue eval_closures(const ClosureSet& set, Vec3 /*n_geometric*/
     return value;
 }
 
-// One lobe's draw, before the others are asked what they think of its direction.
-struct LobeSample {
-    Vec3 direction;
-    Color f;        // f |cos| without the lobe's weight; for a delta lobe the fraction of light
-    float pdf_sa;   // for a delta lobe the probability; 0: no sample
-    float roughness, eta;
-    bool delta, transmitted;
-};
-
-LUCH_FN LobeSample sample_lobe(const Lobe& lobe, Vec3 n_geometric, Vec3 wo, float /*u_side*/, Vec2 u) {
+LUCH_FN LobeSample sample_fibres_or_diffuse(const Lobe& lobe, Vec3 n_outside, Vec3 wo, Vec2 u) {
     LobeSample s = {};
-    s.eta = s.roughness = 1.0f;
-    bool through = lobe.type == LobeType::TRANSLUCENT;
-    s.transmitted = through || (lobe.flags & LOBE_MIRRORED);
-    Vec3 outside = lobe.flags & LOBE_MIRRORED ? -n_geometric : n_geometric;
-    s.direction = sample_cosine_around(through ? -lobe.normal : lobe.normal, u);
-    if ((dot(outside, s.direction) > 0.0f) == through) return s;
+    s.transmitted = lobe.type == LobeType::TRANSLUCENT;
+    if (lobe.type == LobeType::SHEEN) {
+        s.direction = sample_sheen(lobe, u);
+    } else if (lobe.type == LobeType::ASHIKHMIN_SHEEN) {
+        s.direction = sample_uniform_around(lobe.normal, u);
+    } else {
+        s.direction = sample_cosine_around(s.transmitted ? -lobe.normal : lobe.normal, u);
+    }
+    float side = dot(n_outside, s.direction);
+    if (s.transmitted ? !(side < 0.0f) : !(side > 0.0f)) return s;
     LobeValue v = eval_lobe_unshadowed(lobe, wo, s.direction);
     s.f = v.f;
     s.pdf_sa = v.pdf_sa;
+    return s;
+}
+
+LUCH_FN LobeSample sample_lobe(const Lobe& lobe, Vec3 n_geometric, Vec3 wo, float u_side, Vec2 u) {
+    bool mirrored = lobe.flags & LOBE_MIRRORED;
+    Vec3 outside = mirrored ? -n_geometric : n_geometric;
+    Vec3 seen_from = mirrored ? mirrored_at(wo, lobe.normal) : wo;
+    LobeSample s;
+    if (lobe.type >= LobeType::MICROFACET_REFLECTION) {
+        s = lobe.type == LobeType::ASHIKHMIN_SHIRLEY ? sample_ashikhmin_shirley(lobe, outside, seen_from, u)
+                                                     : sample_microfacet(lobe, outside, seen_from, u_side, u);
+    } else {
+        s = sample_fibres_or_diffuse(lobe, outside, seen_from, u);
+    }
+    s.transmitted = s.transmitted || mirrored;
     return s;
 }
 
@@ -102,8 +122,7 @@ LUCH_FN_SLOW BsdfSample sample_closures(const ClosureSet& set, Vec3 n_geometric,
     for (int i = 0; i < set.count; ++i) weight_sum += set.lobes[i].sample_weight;
     int chosen = set.count > 1 ? choose_lobe(set, weight_sum, &u_lobe) : 0;
     const Lobe& lobe = set.lobes[chosen];
-    Vec3 seen_from = lobe.flags & LOBE_MIRRORED ? mirrored_at(wo, lobe.normal) : wo;
-    LobeSample s = sample_lobe(lobe, n_geometric, seen_from, u_lobe, u);
+    LobeSample s = sample_lobe(lobe, n_geometric, wo, u_lobe, u);
     if (!(s.pdf_sa > 0.0f)) return out;
     if ((lobe.flags & LOBE_BUMPED) && !s.transmitted)
         s.f *= bump_shadow(lobe, is_diffuse(lobe.type), set.n_smooth, s.direction, false);
@@ -144,9 +163,18 @@ LUCH_FN void blur_closures(ClosureSet& set, float roughness) {
 }
 
 // What the lobes reflect and transmit of a white surrounding: the Color passes.
-LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 /*wo*/) {
+LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 wo) {
     BsdfValue value = {};
-    for (int i = 0; i < set.count; ++i) value.diffuse += set.lobes[i].weight;
+    for (int i = 0; i < set.count; ++i) {
+        const Lobe& lobe = set.lobes[i];
+        if (lobe.type < LobeType::MICROFACET_REFLECTION) {
+            add_to_class(value, lobe_class(lobe, lobe.normal), lobe.weight);
+        } else {
+            FresnelTerm albedo = lobe_albedo(lobe, wo);
+            value.glossy += lobe.weight * albedo.reflected;
+            value.transmission += lobe.weight * albedo.transmitted;
+        }
+    }
     return value;
 }
 

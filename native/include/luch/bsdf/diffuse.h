@@ -1,15 +1,9 @@
 // Lambert, Oren-Nayar and translucent lobes.
 #pragma once
-#include "luch/bsdf/closure.h"
+#include "luch/bsdf/lobe_value.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
-
-// One lobe's answer for a pair of directions: f |cos| without the lobe's weight, and its density.
-struct LobeValue {
-    Color f;
-    float pdf_sa;  // 0: the lobe does not reach this direction
-};
 
 // Below this roughness Oren-Nayar is Lambert.
 inline constexpr float OREN_NAYAR_MIN_ROUGHNESS = 1e-5f;
@@ -55,7 +49,7 @@ LUCH_FN LobeValue eval_diffuse(const Lobe& lobe, Vec3 wi) {
 }
 LUCH_FN LobeValue eval_oren_nayar(const Lobe& lobe, Vec3 wo, Vec3 wi) {
     float cos_wi = dot(lobe.normal, wi);
-    if (!(cos_wi > 0.0f)) return {make_vec3(0.0f), 0.0f};
+    if (!(cos_wi > 0.0f)) return no_value();
     return {oren_nayar_f(lobe, wo, wi, cos_wi), cos_wi * INV_PI};
 }
 LUCH_FN LobeValue eval_translucent(const Lobe& lobe, Vec3 wi) {

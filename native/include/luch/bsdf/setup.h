@@ -1,11 +1,13 @@
 // One setup function per Blender node: it turns the node's inputs into lobes, emission,
 // transparency or holdout. `weight` is the closure's weight in its mix and add tree; where a node
 // has a colour, `color` is passed beside it and not multiplied in. Normals need not be unit; the
-// zero vector means "the shading normal". A zero tangent means isotropic.
+// zero vector means "the shading normal". A zero tangent means isotropic. The nodes with many inputs
+// (glossy, metallic, glass, refraction, principled) take a struct: setup_specular.h, principled.h.
 #pragma once
 #include "luch/bsdf/diffuse.h"
-#include "luch/bsdf/params.h"
-#include "luch/bsdf/setup_context.h"
+#include "luch/bsdf/principled.h"
+#include "luch/bsdf/setup_specular.h"
+#include "luch/bsdf/sheen.h"
 
 namespace luch {
 
@@ -38,13 +40,20 @@ LUCH_FN void setup_background(ClosureSet& set, Color weight, Color color, float 
 
 LUCH_FN void setup_holdout(ClosureSet& set, Color weight) { set.holdout += average(weight); }
 
-// To come, in this very file's include list:
-//   setup_glossy(ClosureSet&, Color weight, const GlossyParams&, const SetupContext&);
-//   setup_metallic(ClosureSet&, Color weight, const MetallicParams&, const SetupContext&);
-//   setup_glass(ClosureSet&, Color weight, const GlassParams&, const SetupContext&);
-//   setup_refraction(ClosureSet&, Color weight, const RefractionParams&, const SetupContext&);
-//   setup_sheen(ClosureSet&, Color weight, Color color, float roughness, Vec3 normal, const SetupContext&);
-//   setup_velvet(ClosureSet&, Color weight, Color color, float roughness, Vec3 normal, const SetupContext&);
-//   setup_principled(ClosureSet&, Color weight, const PrincipledParams&, const SetupContext&);
+LUCH_FN_SLOW void setup_sheen(ClosureSet& set, Color weight, Color color, float roughness, Vec3 normal,
+                              const SetupContext& c) {
+    Lobe lobe;
+    if (!start_lobe(lobe, LobeType::SHEEN, weight * color, closure_normal(normal, c), c)) return;
+    if (prepare_sheen(lobe, c.wo, roughness)) add_lobe(set, lobe, c);
+}
+
+// The sheen node's older distribution.
+LUCH_FN void setup_velvet(ClosureSet& set, Color weight, Color color, float roughness, Vec3 normal,
+                          const SetupContext& c) {
+    Lobe lobe;
+    if (!start_lobe(lobe, LobeType::ASHIKHMIN_SHEEN, weight * color, closure_normal(normal, c), c)) return;
+    lobe.extra = 1.0f / sqr(clamp_f(roughness, 0.01f, 1.0f));
+    add_lobe(set, lobe, c);
+}
 
 }  // namespace luch

@@ -1,0 +1,160 @@
+// Rough reflection and refraction on GGX and Beckmann microfacets with height-correlated Smith
+// masking, sampled by the visible normals.
+//
+// Sources: Walter et al. 2007 (the model), Heitz 2014 (masking), Dupuy and Benyoub 2023 (visible
+// normals of GGX by spherical caps), Eto and Tokuyoshi 2023 (the caps' bound for reflection).
+#pragma once
+#include "luch/bsdf/beckmann.h"
+#include "luch/bsdf/lobe_fresnel.h"
+#include "luch/bsdf/lobe_value.h"
+#include "luch/sampling/warp.h"
+
+namespace luch {
+
+// alpha_x alpha_y below which a lobe is a perfect mirror.
+inline constexpr float MIRROR_ALPHA2 = 2e-10f;
+// |ior - 1| below which refraction is straight through.
+inline constexpr float STRAIGHT_IOR = 1e-4f;
+
+LUCH_FN bool is_mirror(const Lobe& l) { return l.alpha_x * l.alpha_y <= MIRROR_ALPHA2; }
+LUCH_FN bool is_anisotropic(const Lobe& l) { return l.alpha_x != l.alpha_y; }
+
+struct Frame {
+    Vec3 t, b, n;
+};
+LUCH_FN Frame lobe_frame(const Lobe& l) {
+    Frame f;
+    f.n = l.normal;
+    if (is_anisotropic(l)) {
+        f.t = l.tangent;
+        f.b = cross(f.n, f.t);
+    } else {
+        make_frame(f.n, &f.t, &f.b);
+    }
+    return f;
+}
+LUCH_FN Vec3 to_local(Vec3 w, const Frame& f) { return {dot(w, f.t), dot(w, f.b), dot(w, f.n)}; }
+
+// The microsurface as seen from one pair of directions. cos_o > 0; cos_i > 0 reflects, < 0 refracts.
+struct Facets {
+    float density;   // D of the half vector
+    float g1, g2;    // masking of wo, and of both, each over cos_o
+};
+
+// stretched_sin2: alpha_x^2 x^2 + alpha_y^2 y^2 of a direction, alpha^2 sin^2 if isotropic.
+LUCH_FN void mask_ggx(float cos_o, float cos_i, float stretched_sin2_o, float stretched_sin2_i, Facets* f) {
+    float t_o = sqrt_f(sqr(cos_o) + stretched_sin2_o), t_i = sqrt_f(sqr(cos_i) + stretched_sin2_i);
+    float c_i = abs_f(cos_i);
+    f->g1 = 2.0f / (cos_o + t_o);
+    f->g2 = 2.0f * c_i / max_f(t_o * c_i + t_i * cos_o, 1e-30f);
+}
+LUCH_FN void mask_beckmann(float cos_o, float cos_i, float stretched_sin2_o, float stretched_sin2_i, Facets* f) {
+    float lambda_o = beckmann_lambda(stretched_sin2_o / sqr(cos_o));
+    float lambda_i = beckmann_lambda(stretched_sin2_i / max_f(sqr(cos_i), 1e-30f));
+    f->g1 = 1.0f / (cos_o * (1.0f + beckmann_lambda_exact(stretched_sin2_o / sqr(cos_o))));
+    f->g2 = 1.0f / (cos_o * (1.0f + lambda_o + lambda_i));
+}
+
+// How far the cap of visible normals can be cut without losing a reflection above the horizon.
+LUCH_FN float cap_bound(const Lobe& l, float cos_o) {
+    float a2 = sqr(min_f(l.alpha_x, l.alpha_y));
+    float s2 = sqr(1.0f + safe_sqrt(1.0f - sqr(cos_o)));
+    return (1.0f - a2) * s2 / (s2 + a2 * sqr(cos_o));
+}
+LUCH_FN bool uses_cap_bound(const Lobe& l) {
+    return l.type == LobeType::MICROFACET_REFLECTION && l.distribution == Distribution::GGX;
+}
+
+// h_local: unit half vector on the normal's side.
+LUCH_FN Facets facets(const Lobe& l, Vec3 o, Vec3 i, Vec3 h) {
+    Facets f;
+    float ax2 = sqr(l.alpha_x), ay2 = sqr(l.alpha_y);
+    // Refraction has no anisotropy: the mean roughness serves.
+    if (i.z < 0.0f) ax2 = ay2 = l.alpha_x * l.alpha_y;
+    float a2 = sqrt_f(ax2 * ay2);
+    float so = ax2 * sqr(o.x) + ay2 * sqr(o.y), si = ax2 * sqr(i.x) + ay2 * sqr(i.y);
+    if (l.distribution == Distribution::GGX) {
+        float e = sqr(h.x) * (a2 / ax2) + sqr(h.y) * (a2 / ay2) + a2 * sqr(h.z);
+        f.density = a2 * INV_PI / sqr(e);
+        mask_ggx(o.z, i.z, so, si, &f);
+        if (uses_cap_bound(l)) f.g1 = 2.0f / (cap_bound(l, o.z) * o.z + sqrt_f(sqr(o.z) + so));
+    } else {
+        float z2 = max_f(sqr(h.z), 1e-20f);
+        f.density = exp_f(-(sqr(h.x) / ax2 + sqr(h.y) / ay2) / z2) * INV_PI / (a2 * sqr(z2));
+        mask_beckmann(o.z, i.z, so, si, &f);
+    }
+    return f;
+}
+
+LUCH_FN float reflect_probability(const FresnelTerm& f) {
+    float r = average(f.reflected), sum = r + average(f.transmitted);
+    return sum > 0.0f ? r / sum : 0.0f;
+}
+
+LUCH_FN_SLOW LobeValue eval_microfacet(const Lobe& l, Vec3 wo, Vec3 wi) {
+    float cos_o = dot(l.normal, wo), cos_i = dot(l.normal, wi);
+    bool through = cos_i < 0.0f;
+    if (!(cos_o > 0.0f) || is_mirror(l)) return no_value();
+    if (through ? !can_transmit(l) || abs_f(l.ior - 1.0f) < STRAIGHT_IOR : !can_reflect(l)) return no_value();
+    Vec3 h = through ? -(l.ior * wi + wo) : wi + wo;
+    float inv_length = safe_divide(1.0f, length(h));
+    h *= inv_length;
+    Frame frame = lobe_frame(l);
+    Vec3 h_local = to_local(h, frame);
+    float cos_ho = dot(h, wo), cos_hi = dot(h, wi);
+    // The facet is seen by both from its right side, or no light takes this way.
+    if (through && !(cos_ho * h_local.z > 0.0f && cos_hi * h_local.z < 0.0f)) return no_value();
+    FresnelTerm fresnel = fresnel_term(l, abs_f(cos_ho));
+    float reflects = reflect_probability(fresnel);
+    Facets f = facets(l, to_local(wo, frame), to_local(wi, frame), h_local);
+    float common = f.density * (through ? sqr(l.ior * inv_length) * abs_f(cos_ho * cos_hi) : 0.25f);
+    Color share = through ? fresnel.transmitted : fresnel.reflected;
+    return {share * (common * f.g2 * l.energy_scale), common * f.g1 * (through ? 1.0f - reflects : reflects)};
+}
+
+// Visible normal of GGX for local direction o; `bound` cuts the cap, 1 keeps it whole.
+LUCH_FN Vec3 sample_visible_ggx(const Lobe& l, Vec3 o, float bound, Vec2 u) {
+    Vec3 std_o = normalize(make_vec3(l.alpha_x * o.x, l.alpha_y * o.y, o.z));
+    float low = bound * std_o.z;
+    float z = (1.0f - u.y) * (1.0f + low) - low;
+    float r = safe_sqrt(1.0f - z * z), phi = TWO_PI * u.x;
+    Vec3 h = make_vec3(r * cos_f(phi), r * sin_f(phi), z) + std_o;
+    return normalize_or(make_vec3(l.alpha_x * h.x, l.alpha_y * h.y, max_f(h.z, 0.0f)), make_vec3(0.0f, 0.0f, 1.0f));
+}
+
+LUCH_FN_SLOW LobeSample sample_microfacet(const Lobe& l, Vec3 n_geometric, Vec3 wo, float u_side, Vec2 u) {
+    LobeSample s = {};
+    Frame frame = lobe_frame(l);
+    Vec3 o = to_local(wo, frame);
+    if (!(o.z > 0.0f)) return s;
+    bool mirror = is_mirror(l);
+    Vec3 h = {0.0f, 0.0f, 1.0f};
+    if (!mirror) {
+        h = l.distribution == Distribution::GGX ? sample_visible_ggx(l, o, uses_cap_bound(l) ? cap_bound(l, o.z) : 1.0f, u)
+                                                : sample_visible_beckmann(o, l.alpha_x, l.alpha_y, u);
+    }
+    float cos_ho = dot(h, o);
+    FresnelTerm fresnel = fresnel_term(l, cos_ho);
+    float reflects = reflect_probability(fresnel);
+    if (is_zero(fresnel.reflected) && is_zero(fresnel.transmitted)) return s;
+    s.transmitted = !(u_side < reflects);
+    float inv_ior = 1.0f / l.ior;
+    Vec3 i = s.transmitted ? h * (inv_ior * cos_ho - fresnel.cos_t) - o * inv_ior : h * (2.0f * cos_ho) - o;
+    s.direction = to_world(i, frame.t, frame.b, frame.n);
+    if ((dot(n_geometric, s.direction) < 0.0f) != s.transmitted || (i.z < 0.0f) != s.transmitted) return s;
+    s.f = s.transmitted ? fresnel.transmitted : fresnel.reflected;
+    s.pdf_sa = s.transmitted ? 1.0f - reflects : reflects;
+    s.delta = mirror || (s.transmitted && abs_f(l.ior - 1.0f) < STRAIGHT_IOR);
+    s.roughness = min_f(l.alpha_x, l.alpha_y);
+    s.eta = s.transmitted ? l.ior : 1.0f;
+    s.f *= l.energy_scale;
+    if (s.delta) return s;
+    Facets f = facets(l, o, i, h);
+    float common =
+        f.density * (s.transmitted ? abs_f(cos_ho * fresnel.cos_t) / sqr(cos_ho * inv_ior - fresnel.cos_t) : 0.25f);
+    s.f *= common * f.g2;
+    s.pdf_sa *= common * f.g1;
+    return s;
+}
+
+}  // namespace luch
