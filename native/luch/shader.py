@@ -38,7 +38,7 @@ ATTRIBUTE_TANGENT = 0xFFFFFFF3
 
 # Closures that light needs (emission, shadows); their operations come first in the program.
 _LIGHT_CLOSURES = ("CLOSURE_EMISSION", "CLOSURE_TRANSPARENT", "CLOSURE_HOLDOUT")
-_BACKFACING = "GEOMETRY_BACKFACING"
+_BACKFACING = "POINT_BACKFACING"
 
 
 @dataclass(frozen=True)

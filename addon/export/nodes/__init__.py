@@ -18,9 +18,14 @@ from luch.shader import ProgramBuilder
 
 from .tree import Compiler, Context
 
-FAMILIES = ("inputs", "closures")
+FAMILIES = ("converters", "inputs", "vectors", "colors", "closures")
 for _family in FAMILIES:
     importlib.import_module(f".{_family}", __name__)
+
+from .inputs import normal  # noqa: E402
+from .vectors import bump_normal  # noqa: E402
+
+DISPLACEMENT_FILTER_WIDTH = 0.1  # of the stencil that turns displacement into bump, as in Cycles
 
 __all__ = ["Context", "compile_light", "compile_material", "compile_world", "default_material"]
 
@@ -34,6 +39,9 @@ def compile_material(material: bpy.types.Material | None, context: Context) -> s
     owner = f'Material "{material.name}"'
     inlined = bpy.types.InlineShaderNodes.from_material(material)
     compiler = Compiler(inlined.node_tree, owner, context)
+    compiler.pass_index = float(material.pass_index)
+    with _deep_trees():
+        _emit_displacement(compiler, material)
     _emit_surface(compiler)
     estimate = compiler.builder.emission() or compiler.builder.emission_bound()
     settings = getattr(material, "cycles", None)
@@ -83,6 +91,26 @@ def _emit_surface(compiler: Compiler) -> None:
     one = compiler.builder.vector(1.0, 1.0, 1.0)
     with _deep_trees():
         compiler.closure(output, "Surface", one)
+
+
+def _emit_displacement(compiler: Compiler, material: bpy.types.Material) -> None:
+    """Shows displacement as bump: the height is the displacement's component along the normal."""
+    output = compiler.tree.get_output_node("CYCLES")
+    if output is None or not compiler.is_linked(output, "Displacement"):
+        return
+    if material.displacement_method != "BUMP":
+        compiler.warn(output, "displaces the surface, which is not supported yet; bump is shown instead")
+    b = compiler.builder
+    plain = normal(compiler)
+    compiler.surface_normal = bump_normal(
+        compiler,
+        lambda: b.op1("VECTOR_DOT_PRODUCT", (*compiler.vector(output, "Displacement"), *plain)),
+        strength=b.constant(1.0),
+        distance=b.constant(1.0),
+        filter_width=DISPLACEMENT_FILTER_WIDTH,
+        base=plain,
+        object_space=False,
+    )
 
 
 @contextmanager

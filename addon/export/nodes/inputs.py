@@ -7,9 +7,18 @@ unlinked; all of them heed the bump stencil (Compiler.offset_params).
 from __future__ import annotations
 
 import bpy
-from luch.shader import ATTRIBUTE_UV, Vector
+import numpy as np
+from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_UV, Vector, float_word
 
 from .tree import Compiler, Outputs, emitter
+
+# PathFlag of shade/point.h
+_CAMERA, _SHADOW, _DIFFUSE, _GLOSSY, _SINGULAR, _REFLECT, _TRANSMIT, _VOLUME = (1 << k for k in range(8))
+
+# Attributes that the exporter computes on request.
+TANGENT_ATTRIBUTE = "tangent"  # of the active UV map; "tangent:NAME" of another: x, y, z, sign
+ISLAND_ATTRIBUTE = "island_random"  # one number in 0..1 per connected part
+POINTINESS_ATTRIBUTE = "pointiness"
 
 
 def position(c: Compiler) -> Vector:
@@ -18,8 +27,8 @@ def position(c: Compiler) -> Vector:
 
 
 def normal(c: Compiler) -> Vector:
-    """Shading normal, world space, on the side of the ray."""
-    return c.builder.op3("POINT_NORMAL")
+    """Shading normal, world space, on the side of the ray; bent where the material's displacement is bump."""
+    return c.surface_normal or c.builder.op3("POINT_NORMAL")
 
 
 def generated(c: Compiler) -> Vector:
@@ -30,7 +39,13 @@ def generated(c: Compiler) -> Vector:
 def uv(c: Compiler, name: str = "") -> Vector:
     """A UV map by name, the active one without; z is 0."""
     slot = c.builder.attribute(name) if name else ATTRIBUTE_UV
-    return c.builder.op("ATTRIBUTE_VALUE", (), (*c.offset_params(), slot))[:3]  # type: ignore[return-value]
+    x, y, z, _factor, _alpha = c.builder.op("ATTRIBUTE_VALUE", (), (*c.offset_params(), slot))
+    return x, y, z
+
+
+def tangent_slot(c: Compiler, uv_map: str) -> int:
+    """Attribute slot of the tangents of a UV map, the active one without a name."""
+    return c.builder.attribute(f"{TANGENT_ATTRIBUTE}:{uv_map}" if uv_map else TANGENT_ATTRIBUTE)
 
 
 @emitter("ShaderNodeValue")
@@ -44,3 +59,201 @@ def rgb(c: Compiler, node: bpy.types.Node) -> Outputs:
     """RGB: a colour."""
     red, green, blue, _alpha = node.outputs[0].default_value
     return {"Color": c.builder.vector(red, green, blue)}
+
+
+@emitter("ShaderNodeTexCoord")
+def texture_coordinate(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Texture Coordinate, of the object itself, of another one, or of the instancer."""
+    b, corner = c.builder, c.offset_params()
+    if node.object is not None:
+        to_object = np.linalg.inv(np.array(c.context.object_matrix(node.object), np.float64))[:3]
+        object_space = b.op3("POINT_OTHER_OBJECT", (), (*corner, *(float_word(x) for x in to_object.ravel())))
+    else:
+        object_space = b.op3("POINT_OBJECT", (), corner)
+    return {
+        "Generated": b.op3("INSTANCER_GENERATED") if node.from_instancer else generated(c),
+        "Normal": b.op3("POINT_OBJECT_NORMAL"),
+        "UV": b.op3("INSTANCER_UV") if node.from_instancer else uv(c),
+        "Object": object_space,
+        "Camera": b.op3("POINT_CAMERA", (), corner),
+        "Window": b.op3("POINT_WINDOW", (), corner),
+        "Reflection": b.op3("POINT_REFLECTION"),
+    }
+
+
+@emitter("ShaderNodeUVMap")
+def uv_map(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """UV Map, by name or of the instancer."""
+    return {"UV": c.builder.op3("INSTANCER_UV") if node.from_instancer else uv(c, node.uv_map)}
+
+
+@emitter("ShaderNodeNewGeometry")
+def geometry(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Geometry."""
+    b, corner = c.builder, c.offset_params()
+    outputs: Outputs = {
+        "Position": position(c),
+        "Normal": normal(c),
+        "Tangent": b.op3("TANGENT_RADIAL", (), (0, 0, 2)),
+        "True Normal": b.op3("POINT_TRUE_NORMAL"),
+        "Incoming": b.op3("POINT_INCOMING"),
+        "Parametric": b.op3("POINT_PARAMETRIC", (), corner),
+        "Backfacing": b.op1("POINT_BACKFACING"),
+    }
+    for identifier, name in (("Pointiness", POINTINESS_ATTRIBUTE), ("Random Per Island", ISLAND_ATTRIBUTE)):
+        if c.output_used(node, identifier):
+            outputs[identifier] = b.op("ATTRIBUTE_VALUE", (), (*corner, b.attribute(name)))[0]
+    return outputs
+
+
+@emitter("ShaderNodeObjectInfo")
+def object_info(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Object Info."""
+    b = c.builder
+    red, green, blue, alpha = b.op("OBJECT_COLOR")
+    return {
+        "Location": b.op3("OBJECT_LOCATION"),
+        "Color": (red, green, blue),
+        "Alpha": alpha,
+        "Object Index": b.op1("OBJECT_INDEX"),
+        "Material Index": b.constant(c.pass_index),
+        "Random": b.op1("OBJECT_RANDOM"),
+    }
+
+
+def _view_layer_value(c: Compiler, path: str) -> tuple[float, float, float, float]:
+    """A property of the view layer, else of the scene, as a colour; 0 where there is none."""
+    for owner in (c.context.view_layer, c.context.scene):
+        for spelled in (f'["{path}"]', path):  # custom properties first
+            try:
+                found = owner.path_resolve(spelled)
+            except (ValueError, TypeError):
+                continue
+            if isinstance(found, (int, float)):
+                return float(found), float(found), float(found), 1.0
+            numbers = [float(number) for number in found][:4] if hasattr(found, "__len__") else []
+            if len(numbers) in (3, 4):
+                return (*numbers, 1.0)[:4]  # type: ignore[return-value]
+    return 0.0, 0.0, 0.0, 0.0
+
+
+@emitter("ShaderNodeAttribute")
+def attribute(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Attribute of the geometry or of the view layer."""
+    b = c.builder
+    if node.attribute_type == "VIEW_LAYER":
+        red, green, blue, alpha = _view_layer_value(c, node.attribute_name)
+        color = b.vector(red, green, blue)
+        mean = b.constant((red + green + blue) / 3.0)
+        return {"Color": color, "Vector": color, "Fac": mean, "Alpha": b.constant(alpha)}
+    if node.attribute_type != "GEOMETRY":
+        c.warn(node, f"reads attributes of the {node.attribute_type.lower()}, which are not supported yet; 0 is used")
+        return {}
+    params = (*c.offset_params(), b.attribute(node.attribute_name))
+    x, y, z, factor, alpha_value = b.op("ATTRIBUTE_VALUE", (), params)
+    return {"Color": (x, y, z), "Vector": (x, y, z), "Fac": factor, "Alpha": alpha_value}
+
+
+@emitter("ShaderNodeVertexColor")
+def color_attribute(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Color Attribute, by name or the active one."""
+    slot = c.builder.attribute(node.layer_name)  # "" asks the exporter for the active one
+    params = (*c.offset_params(), slot if node.layer_name else ATTRIBUTE_COLOR)
+    red, green, blue, alpha = c.builder.op("ATTRIBUTE_COLOR", (), params)
+    return {"Color": (red, green, blue), "Alpha": alpha}
+
+
+@emitter("ShaderNodeLightPath")
+def light_path(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Light Path."""
+    b = c.builder
+    flags = {
+        "Is Camera Ray": _CAMERA,
+        "Is Shadow Ray": _SHADOW,
+        "Is Diffuse Ray": _DIFFUSE,
+        "Is Glossy Ray": _GLOSSY,
+        "Is Singular Ray": _SINGULAR,
+        "Is Reflection Ray": _REFLECT,
+        "Is Transmission Ray": _TRANSMIT,
+        "Is Volume Scatter Ray": _VOLUME,
+    }
+    outputs: Outputs = {name: b.op1("LIGHT_PATH_FLAG", (), (bit,)) for name, bit in flags.items()}
+    outputs["Ray Length"] = b.op1("LIGHT_PATH_LENGTH")
+    outputs["Ray Depth"] = b.op1("LIGHT_PATH_DEPTH")
+    for name, shift in (("Diffuse Depth", 8), ("Glossy Depth", 16), ("Transmission Depth", 24)):
+        outputs[name] = b.op1("LIGHT_PATH_KIND_DEPTH", (), (shift,))
+    outputs["Transparent Depth"] = b.op1("LIGHT_PATH_TRANSPARENT_DEPTH")
+    outputs["Portal Depth"] = b.constant(0.0)
+    return outputs
+
+
+@emitter("ShaderNodeLightFalloff")
+def light_falloff(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Light Falloff."""
+    inputs = (c.float(node, "Strength"), c.float(node, "Smooth"))
+    return dict(zip(("Quadratic", "Linear", "Constant"), c.builder.op("LIGHT_FALLOFF", inputs), strict=True))
+
+
+@emitter("ShaderNodeFresnel")
+def fresnel(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Fresnel."""
+    facing = c.vector_or(node, "Normal", lambda: normal(c))
+    return {"Fac": c.builder.op1("FRESNEL", (c.float(node, "IOR"), *facing))}
+
+
+@emitter("ShaderNodeLayerWeight")
+def layer_weight(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Layer Weight."""
+    inputs = (c.float(node, "Blend"), *c.vector_or(node, "Normal", lambda: normal(c)))
+    return {
+        "Fresnel": c.builder.op1("LAYER_WEIGHT_FRESNEL", inputs),
+        "Facing": c.builder.op1("LAYER_WEIGHT_FACING", inputs),
+    }
+
+
+@emitter("ShaderNodeCameraData")
+def camera_data(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Camera Data."""
+    x, y, z, depth, distance = c.builder.op("CAMERA_DATA")
+    return {"View Vector": (x, y, z), "View Z Depth": depth, "View Distance": distance}
+
+
+@emitter("ShaderNodeTangent")
+def tangent(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Tangent, around an axis or along a UV map."""
+    if node.direction_type == "RADIAL":
+        params = (0, 0, ("X", "Y", "Z").index(node.axis))
+        return {"Tangent": c.builder.op3("TANGENT_RADIAL", (), params)}
+    return {"Tangent": c.builder.op3("TANGENT_UV", (), (0, 0, tangent_slot(c, node.uv_map)))}
+
+
+@emitter("ShaderNodeWireframe")
+def wireframe(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Wireframe, in world units or pixels."""
+    params = (*c.offset_params(), int(node.use_pixel_size))
+    return {"Fac": c.builder.op1("WIREFRAME", (c.float(node, "Size"),), params)}
+
+
+@emitter("ShaderNodeBevel")
+def bevel(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Bevel: not traced; the normal stays sharp."""
+    c.warn(node, "is not supported yet; the normal stays as it is")
+    return {"Normal": c.vector_or(node, "Normal", lambda: normal(c))}
+
+
+@emitter("ShaderNodeAmbientOcclusion")
+def ambient_occlusion(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Ambient Occlusion: not traced; nothing is occluded."""
+    c.warn(node, "is not supported yet; nothing is taken as occluded")
+    return {"Color": c.color(node, "Color"), "AO": c.builder.constant(1.0)}
+
+
+@emitter("ShaderNodeHairInfo", "ShaderNodePointInfo", "ShaderNodeParticleInfo", "ShaderNodeVolumeInfo")
+def no_such_geometry(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Hair, Point, Particle and Volume Info on a mesh: zero, as in Cycles."""
+    return {
+        socket.identifier: c.builder.vector(0.0, 0.0, 0.0)
+        if socket.type in ("VECTOR", "RGBA")
+        else c.builder.constant(0.0)
+        for socket in node.outputs
+    }

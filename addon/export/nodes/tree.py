@@ -53,6 +53,9 @@ class Context(Protocol):
     def warn(self, text: str) -> None:
         """Adds one sentence to the scene's warnings."""
 
+    scene: bpy.types.Scene
+    view_layer: bpy.types.ViewLayer
+
     def object_matrix(self, obj: bpy.types.Object) -> Any:
         """World matrix of an object as evaluated, (4, 4) float64."""
 
@@ -87,7 +90,10 @@ class Compiler:
         self.owner = owner  # 'Material "Gold"', for warnings
         self.context = context
         self.builder = ProgramBuilder()
+        self.pass_index = 0.0  # Object Info > Material Index
+        self.surface_normal: Vector | None = None  # where displacement is shown as bump
         self._links = {(link.to_node.name, link.to_socket.identifier): link for link in tree.links if link.is_valid}
+        self._used = {(link.from_node.name, link.from_socket.identifier) for link in self._links.values()}
         self._outputs: dict[tuple[str, int, float], Outputs] = {}
         self._offset = 0  # corner of the bump stencil
         self._filter_width = 0.0
@@ -95,6 +101,10 @@ class Compiler:
         self._open: list[str] = []  # nodes being emitted, to find loops
 
     # -- reading inputs -----------------------------------------------------------------------
+
+    def output_used(self, node: bpy.types.Node, identifier: str) -> bool:
+        """Whether anything reads the output."""
+        return (node.name, identifier) in self._used
 
     def is_linked(self, node: bpy.types.Node, identifier: str) -> bool:
         """Whether something feeds the input."""

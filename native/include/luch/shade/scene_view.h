@@ -65,6 +65,7 @@ struct ImageView {
 };
 
 struct LightsView;  // light/light.h
+struct CameraView;  // camera/camera.h
 
 struct SceneView {
     const float* positions;      // 3 per vertex, object space
@@ -92,6 +93,8 @@ struct SceneView {
     Program world_program;
     Affine world_to_camera;      // Texture Coordinate > Camera/Window, Camera Data
     Vec3 camera_position;
+    const CameraView* camera;    // Texture Coordinate > Camera/Window, Camera Data; null: they give 0
+    Vec2 frame_size;             // pixels of the full frame: Texture Coordinate > Window
     Vec3 origin;                 // Scene.origin: added to a position it gives Blender's world
 };
 
