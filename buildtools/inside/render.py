@@ -62,7 +62,7 @@ def _statistics(engine: str, scene: bpy.types.Scene, render: session.Render) -> 
     if engine == "LUCH":
         from addon import engine as luch_engine
 
-        statistics["luch"] = luch_engine.last_statistics()
+        statistics["luch"] = luch_engine.last_stats.get(scene.name, {})
     return statistics
 
 

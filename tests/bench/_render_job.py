@@ -37,7 +37,7 @@ def main() -> None:
     if job["engine"] == "LUCH":
         from addon import engine
 
-        result["luch"] = engine.last_statistics()
+        result["luch"] = engine.last_stats.get(scene.name, {})
     print("RESULT " + json.dumps(result))
 
 
