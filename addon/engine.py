@@ -26,11 +26,11 @@ class LuchRenderEngine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True
 
-    def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
+    def update_render_passes(self, scene: Any, renderlayer: Any) -> None:  # type: ignore[override]
         """Blender asks which passes there will be."""
         passes.register_passes(self, scene, renderlayer)
 
-    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def render(self, depsgraph: Any) -> None:  # type: ignore[override]
         """One view layer of one frame. Whatever goes wrong ends as a sentence for the user: an exception that got
         through here would count as a finished render, or crash Blender when it saves the file."""
         try:
@@ -39,7 +39,7 @@ class LuchRenderEngine(bpy.types.RenderEngine):
             traceback.print_exc()
             self.report({"ERROR"}, describe_error(error))
 
-    def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def _render(self, depsgraph: Any) -> None:
         from luch.render import render
 
         from .export import export_scene
@@ -55,7 +55,7 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         last_stats[depsgraph.scene.name] = stats
         writer.stamp(stats, scene)
 
-    def _mesh_cache(self, depsgraph: bpy.types.Depsgraph) -> MeshCache:
+    def _mesh_cache(self, depsgraph: Any) -> MeshCache:
         """The meshes of the frame before, if the user wants them kept; Blender then keeps this engine too."""
         if not depsgraph.scene.render.use_persistent_data:
             return MeshCache()

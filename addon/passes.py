@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import bpy
-
 
 @dataclass(frozen=True)
 class RenderPass:
@@ -60,17 +58,17 @@ def _switched_on(view_layer: Any, path: str) -> bool:
     return bool(owner)
 
 
-def cryptomatte_kinds(view_layer: bpy.types.ViewLayer) -> list[str]:
+def cryptomatte_kinds(view_layer: Any) -> list[str]:
     """Kinds of cryptomatte that the view layer asks for: of "Object", "Material", "Asset"."""
     return [kind for kind in CRYPTOMATTE_KINDS if _switched_on(view_layer, f"use_pass_cryptomatte_{kind.lower()}")]
 
 
-def cryptomatte_depth(view_layer: bpy.types.ViewLayer) -> int:
+def cryptomatte_depth(view_layer: Any) -> int:
     """How many objects a pixel can name; each pass holds two."""
-    return (min(16, view_layer.pass_cryptomatte_depth) + 1) // 2 * 2
+    return int((min(16, view_layer.pass_cryptomatte_depth) + 1) // 2 * 2)
 
 
-def enabled_passes(view_layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
+def enabled_passes(view_layer: Any) -> Iterator[RenderPass]:
     """The passes of a view layer, Combined first, in the order Blender's compositor shows them."""
     yield RenderPass("Combined", "RGBA", "COLOR")
     for entry in TABLE:
@@ -88,7 +86,7 @@ def enabled_passes(view_layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
         yield RenderPass(f"Combined_{group.name}", "RGB", "COLOR")
 
 
-def register_passes(engine: bpy.types.RenderEngine, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+def register_passes(engine: Any, scene: Any, view_layer: Any) -> None:
     """Tell Blender which passes the engine will deliver for a view layer."""
     for entry in enabled_passes(view_layer):
         engine.register_pass(scene, view_layer, entry.name, len(entry.channels), entry.channels, entry.kind)

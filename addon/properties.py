@@ -1,6 +1,11 @@
 """Luch's settings in a .blend file: `scene.luch` and `view_layer.luch`. Names shared with Cycles mean the same."""
 
+# mypy: disable-error-code="valid-type"
+# (bpy reads properties from annotations that are calls)
+
 from __future__ import annotations
+
+from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
@@ -129,12 +134,14 @@ CLASSES = (LuchSceneSettings, LuchViewLayerSettings)
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Scene.luch = PointerProperty(type=LuchSceneSettings)
-    bpy.types.ViewLayer.luch = PointerProperty(type=LuchViewLayerSettings)
+    types: Any = bpy.types
+    types.Scene.luch = PointerProperty(type=LuchSceneSettings)
+    types.ViewLayer.luch = PointerProperty(type=LuchViewLayerSettings)
 
 
 def unregister() -> None:
-    del bpy.types.ViewLayer.luch
-    del bpy.types.Scene.luch
+    types: Any = bpy.types
+    del types.ViewLayer.luch
+    del types.Scene.luch
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

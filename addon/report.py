@@ -20,7 +20,7 @@ MIB = 1024.0 * 1024.0
 class Reporter:
     """Speaks for one render through Blender's status line, info area and console."""
 
-    def __init__(self, engine: bpy.types.RenderEngine, scene: bpy.types.Scene) -> None:
+    def __init__(self, engine: Any, scene: Any) -> None:
         self._engine = engine
         self._scene_name = scene.name
         self._interval_s = FIRST_PICTURE_S

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Any
 
-import bpy
 import numpy as np
 from luch.scene import F32, Film, Scene
 
@@ -20,7 +19,7 @@ class ResultWriter:
     A result that is begun and never ended crashes Blender when it saves, so nothing may come between the two.
     """
 
-    def __init__(self, engine: bpy.types.RenderEngine, layer: str, film: Film) -> None:
+    def __init__(self, engine: Any, layer: str, film: Film) -> None:
         self._engine = engine
         self._layer = layer
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
-
 # Settings that both engines have, under the name they share in `scene.luch` and `scene.cycles`.
 SHARED_WITH_CYCLES = frozenset(
     {
@@ -36,7 +34,7 @@ SHARED_WITH_CYCLES = frozenset(
 )
 
 
-def follows_cycles(scene: bpy.types.Scene, name: str) -> bool:
+def follows_cycles(scene: Any, name: str) -> bool:
     """True if a setting's value comes from Cycles: set there by the user, never set here."""
     own: Any = scene.luch
     cycles: Any = getattr(scene, "cycles", None)
@@ -49,7 +47,7 @@ def follows_cycles(scene: bpy.types.Scene, name: str) -> bool:
     )
 
 
-def effective(scene: bpy.types.Scene, name: str) -> Any:
+def effective(scene: Any, name: str) -> Any:
     """The value a render uses. Unset in both engines, Luch's default holds: it never darkens the light (no clamping)."""
     owner: Any = scene.cycles if follows_cycles(scene, name) else scene.luch
     return getattr(owner, name)

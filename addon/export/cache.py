@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import bpy
 from luch.scene import Mesh
 
 from .context import ExportContext
@@ -32,7 +31,7 @@ class MeshCache:
         self._generation = 0
         self.read_count = 0  # meshes copied out of Blender so far
 
-    def begin(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def begin(self, depsgraph: Any) -> None:
         """Start a frame: forget what changed and what the last frame did not use."""
         changed = {update.id.original.session_uid for update in depsgraph.updates if update.is_updated_geometry}
         self._entries = {
@@ -50,9 +49,16 @@ class MeshCache:
         owners = {datablock.original.session_uid for datablock in (subject, parent, data)}
         if entry is None or not wanted <= entry.wanted:
             wanted = wanted | (entry.wanted if entry else set())
-            mesh = export_mesh(data.name, data, wanted, context)
+            mesh = export_mesh(data, wanted, _undeformed(subject, data), context)
             self.read_count += 1
             entry = self._entries[address] = _Entry(mesh, wanted, owners, self._generation)
         entry.owners |= owners
         entry.generation = self._generation
         return entry.mesh
+
+
+def _undeformed(subject: Any, data: Any) -> Any:
+    """The mesh before modifiers and shape keys, if the evaluated mesh comes of it: only its name tells."""
+    original = subject.original.data
+    own = original is not None and original.id_type == "MESH" and data.name == original.name
+    return original if own and (len(subject.modifiers) or original.shape_keys) else None

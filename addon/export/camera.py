@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import bpy
 import numpy as np
 from luch.scene import F64, Camera
 
@@ -14,9 +13,7 @@ from .context import ExportContext
 PANORAMAS = {"EQUIRECTANGULAR": "EQUIRECTANGULAR"}
 
 
-def export_camera(
-    subject: bpy.types.Object | None, context: ExportContext, engine: bpy.types.RenderEngine | None
-) -> Camera:
+def export_camera(subject: Any, context: ExportContext, engine: Any) -> Camera:
     """The camera of a render. Raises ValueError if there is none."""
     if subject is None or subject.type != "CAMERA":
         raise ValueError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
 import numpy as np
 from luch.scene import F64, Scene
 
@@ -12,10 +11,10 @@ from luch.scene import F64, Scene
 class ExportContext:
     """Carried through one export. Node compilers use `image_index`, `warn` and `object_matrix`."""
 
-    def __init__(self, depsgraph: bpy.types.Depsgraph, result: Scene) -> None:
+    def __init__(self, depsgraph: Any, result: Scene) -> None:
         self.depsgraph = depsgraph
-        self.scene: bpy.types.Scene = depsgraph.scene
-        self.view_layer: bpy.types.ViewLayer = depsgraph.view_layer
+        self.scene: Any = depsgraph.scene
+        self.view_layer: Any = depsgraph.view_layer
         self.result = result
         self.frame: int = depsgraph.scene.frame_current
         self._images: dict[tuple[Any, ...], int] = {}
@@ -27,7 +26,7 @@ class ExportContext:
             self._warned.add(text)
             self.result.warnings.append(text)
 
-    def image_index(self, image: bpy.types.Image | None, user: Any = None, *, tile: int = 0) -> int:
+    def image_index(self, image: Any, user: Any = None, *, tile: int = 0) -> int:
         """Index into `Scene.images` of an image's pixels at this frame; a magenta marker if there are none.
 
         user: the node's ImageUser (frame of a sequence or movie); tile: a UDIM number, 0 for the first.
@@ -41,7 +40,7 @@ class ExportContext:
             self.result.images.append(export_image(image, user, tile, self))
         return index
 
-    def object_matrix(self, subject: bpy.types.Object) -> F64:
+    def object_matrix(self, subject: Any) -> F64:
         """Object to world, (4, 4) float64, of any object of this file (Texture Coordinate > Object)."""
         evaluated = subject if subject.is_evaluated else subject.evaluated_get(self.depsgraph)
         return np.array(evaluated.matrix_world, dtype=np.float64)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
+from typing import Any
+
 from luch.scene import Film
 
 from .. import passes
@@ -39,7 +40,7 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
     return film
 
 
-def _border(render: bpy.types.RenderSettings, width: int, height: int) -> tuple[int, int, int, int] | None:
+def _border(render: Any, width: int, height: int) -> tuple[int, int, int, int] | None:
     """The rectangle that Blender allocates for a border: fractions of the frame, cut to whole pixels."""
     if not render.use_border:
         return None

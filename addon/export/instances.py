@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
 import numpy as np
 from luch.scene import Instances, Mesh, Object
 
@@ -19,6 +18,8 @@ LISTED_AGAIN_AS_MESH = frozenset({"CURVE", "SURFACE", "FONT", "META"})
 NOTHING_TO_DRAW = frozenset({"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "GREASEPENCIL"})
 NOT_SUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "a point cloud", "VOLUME": "a volume"}
 NO_OBJECT = -1
+NO_INSTANCER_GENERATED = (1.0, 1.0, 1.0)  # an orco of 1 gives generated 0
+NO_INSTANCER_UV = (0.0, 0.0)
 
 
 def export_instances(context: ExportContext, cache: MeshCache) -> None:
@@ -44,8 +45,8 @@ class InstanceCollector:
         self._object_column: list[int] = []
         self._matrices: list[bytes] = []  # 16 float32 each, rows
         self._random: list[int] = []
-        self._generated: list[Any] = []
-        self._uv: list[Any] = []
+        self._generated: list[float] = []  # 3 each
+        self._uv: list[float] = []  # 2 each
         self._solid: bool = context.view_layer.use_solid
 
     def add(self, item: Any) -> None:
@@ -72,9 +73,7 @@ class InstanceCollector:
 
     def finish(self) -> None:
         """Turn the columns into arrays."""
-        count = len(self._object_column)
-        rows = np.frombuffer(b"".join(self._matrices), dtype=np.float32).reshape(count, 4, 4)
-        matrix = rows[:, :3].astype(np.float64)
+        matrix = np.frombuffer(b"".join(self._matrices), dtype=np.float32).reshape(-1, 4, 4)[:, :3].astype(np.float64)
         finite = np.isfinite(matrix).all(axis=(1, 2))
         if not finite.all():
             index = self._object_column[int(np.argmin(finite))]
@@ -86,8 +85,10 @@ class InstanceCollector:
             object=np.array(self._object_column, dtype=np.uint32)[finite],
             matrix=matrix[finite],
             random=(random * np.float64(1.0 / 0xFFFFFFFF)).astype(np.float32)[finite],
-            generated=(np.array(self._generated, dtype=np.float32).reshape(count, 3) * 0.5 - 0.5)[finite],
-            uv=np.array(self._uv, dtype=np.float32).reshape(count, 2)[finite],
+            generated=(np.array(self._generated, dtype=np.float32).reshape(-1, 3) * np.float32(0.5) - np.float32(0.5))[
+                finite
+            ],
+            uv=np.array(self._uv, dtype=np.float32).reshape(-1, 2)[finite],
         )
 
     def _add_mesh(self, item: Any, subject: Any) -> None:
@@ -101,15 +102,16 @@ class InstanceCollector:
         if index == NO_OBJECT:
             return
         self._object_column.append(index)
+        # Vectors of the iterator point into it: only copies may be kept.
         self._matrices.append(bytes(item.matrix_world))
         if is_instance:
             self._random.append(item.random_id)
-            self._generated.append(item.orco)
-            self._uv.append(item.uv)
+            self._generated.extend(item.orco)
+            self._uv.extend(item.uv)
         else:
             self._random.append(name_hash(subject.name))
-            self._generated.append((1.0, 1.0, 1.0))  # becomes 0 below: no instancer
-            self._uv.append((0.0, 0.0))
+            self._generated.extend(NO_INSTANCER_GENERATED)
+            self._uv.extend(NO_INSTANCER_UV)
 
     def _add_object(self, subject: Any, parent: Any) -> int:
         visibility, holdout = instance_visibility(subject, parent, self._view_layer())
@@ -120,6 +122,9 @@ class InstanceCollector:
         if mesh == NO_OBJECT:
             return NO_OBJECT
         result = self._context.result
+        # A face that names a slot beyond the last shows the last.
+        missing = int(result.meshes[mesh].material_slots.max()) + 1 - len(slots)
+        slots += [slots[-1]] * max(0, missing)
         result.objects.append(
             Object(
                 name=subject.name,
@@ -138,7 +143,7 @@ class InstanceCollector:
             self._context.warn(f'Object "{subject.name}" is a shadow catcher; Luch draws it as an ordinary object.')
         return len(result.objects) - 1
 
-    def _view_layer(self) -> bpy.types.ViewLayer:
+    def _view_layer(self) -> Any:
         """The original view layer: what collection flags are asked of."""
         scene = self._context.scene.original
         return scene.view_layers[self._context.view_layer.name]

@@ -8,12 +8,11 @@ import numpy as np
 from luch.scene import F64, Light
 
 from .context import ExportContext
+from .nodes import compile_light
 
 
 def export_light(subject: Any, matrix: F64, random: float, visibility: int, context: ExportContext) -> Light:
     """A lamp in Blender's units. matrix: (3, 4) object to world."""
-    from .nodes import compile_light
-
     lamp = subject.data
     colour = np.array(lamp.color, dtype=np.float64)
     if lamp.use_temperature:

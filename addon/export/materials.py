@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from luch.scene import Material
-
+from .attributes import wishes
 from .context import ExportContext
+from .nodes import compile_material
 
 
 class MaterialTable:
@@ -15,6 +15,7 @@ class MaterialTable:
     def __init__(self, context: ExportContext) -> None:
         self._context = context
         self._indices: dict[int, int] = {}
+        self._wishes: list[set[str]] = []
         self._override: Any = context.view_layer.material_override
 
     def slots(self, subject: Any, mesh: Any) -> list[int]:
@@ -34,20 +35,17 @@ class MaterialTable:
         index = self._indices.get(key)
         if index is None:
             index = self._indices[key] = len(self._context.result.materials)
-            self._context.result.materials.append(self._compile(material))
+            compiled = compile_material(material, self._context)
+            self._context.result.materials.append(compiled)
+            self._wishes.append(wishes(compiled.surface))
         return index
 
     def attributes(self, indices: list[int]) -> set[str]:
-        """Names of the mesh attributes that these materials read."""
-        return {name for index in indices for name in self._context.result.materials[index].surface.attributes}
+        """What these materials read of a mesh."""
+        return set().union(*(self._wishes[index] for index in indices))
 
     @staticmethod
     def _material(own: Any, given: Any, slot: int) -> Any:
         if slot < len(own) and own[slot].link == "OBJECT":
             return own[slot].material
         return given[slot] if slot < len(given) else None
-
-    def _compile(self, material: Any) -> Material:
-        from .nodes import compile_material
-
-        return compile_material(material, self._context)

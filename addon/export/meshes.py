@@ -6,40 +6,30 @@ import ctypes
 from typing import Any
 
 import numpy as np
-from luch.scene import F32, Attribute, Mesh
+from luch.scene import F32, Mesh
 from numpy.typing import NDArray
 
+from .attributes import add_attributes, read
 from .context import ExportContext
 
 I32 = NDArray[np.int32]
 
-# Blender's attribute types: name of the value in its items, channels, and the type foreach_get copies without a loop.
-ATTRIBUTE_TYPES: dict[str, tuple[str, int, Any]] = {
-    "FLOAT": ("value", 1, np.float32),
-    "INT": ("value", 1, np.int32),
-    "INT8": ("value", 1, np.int32),
-    "BOOLEAN": ("value", 1, np.bool_),
-    "FLOAT2": ("vector", 2, np.float32),
-    "FLOAT_VECTOR": ("vector", 3, np.float32),
-    "FLOAT_COLOR": ("color", 4, np.float32),
-    "BYTE_COLOR": ("color", 4, np.float32),  # foreach_get gives it linear
-    "QUATERNION": ("value", 4, np.float32),
-    "INT32_2D": ("value", 2, np.int32),
-}
 
+def export_mesh(mesh: Any, wanted: set[str], undeformed: Any, context: ExportContext) -> Mesh | None:
+    """Triangles of an evaluated mesh; None if it has none.
 
-def export_mesh(name: str, mesh: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
-    """Triangles of an evaluated mesh; None if it has none. wanted: attributes that its materials read."""
+    wanted: what its materials read (see attributes.wishes). undeformed: the mesh before modifiers, None if unknown.
+    """
     count = len(mesh.loop_triangles)
     if count == 0:
         return None
     corners = _triangle_corners(mesh, count)
-    corner_vertices = _read(mesh.attributes[".corner_vert"].data, "value", len(mesh.loops), np.int32)
-    positions = _read(mesh.attributes["position"].data, "vector", 3 * len(mesh.vertices), np.float32).reshape(-1, 3)
-    faces = _read(mesh.loop_triangle_polygons, "value", count, np.int32)
+    corner_vertices = read(mesh.attributes[".corner_vert"].data, "value", len(mesh.loops), np.int32)
+    positions = read(mesh.attributes["position"].data, "vector", 3 * len(mesh.vertices), np.float32).reshape(-1, 3)
+    faces = read(mesh.loop_triangle_polygons, "value", count, np.int32)
     triangles = corner_vertices[corners].reshape(-1, 3)
     result = Mesh(
-        name=name,
+        name=mesh.name,
         positions=positions,
         triangles=triangles.view(np.uint32),
         material_slots=_material_slots(mesh, faces),
@@ -47,14 +37,8 @@ def export_mesh(name: str, mesh: Any, wanted: set[str], context: ExportContext) 
         texture_size=tuple(mesh.texspace_size),
     )
     _add_normals(result, mesh, corners, faces)
-    _add_attributes(result, mesh, wanted, corners, faces, context)
+    add_attributes(result, mesh, wanted, corners, faces, undeformed, context)
     return _without_invalid(result, context)
-
-
-def _read(items: Any, name: str, length: int, dtype: Any) -> NDArray[Any]:
-    values = np.empty(length, dtype=dtype)
-    items.foreach_get(name, values)
-    return values
 
 
 def _triangle_corners(mesh: Any, count: int) -> I32:
@@ -71,29 +55,29 @@ def _triangle_corners(mesh: Any, count: int) -> I32:
         probes = (0, count // 2, count - 1)
         if all(tuple(shared[index]) == tuple(mesh.loop_triangles[index].loops) for index in probes):
             return shared.reshape(-1).copy()
-    return _read(mesh.loop_triangles, "loops", 3 * count, np.int32)
+    return read(mesh.loop_triangles, "loops", 3 * count, np.int32)
 
 
 def _material_slots(mesh: Any, faces: I32) -> NDArray[np.uint16]:
     layer = mesh.attributes.get("material_index")
     if layer is None or layer.domain != "FACE" or layer.data_type != "INT":
         return np.zeros(len(faces), dtype=np.uint16)
-    slots = _read(layer.data, "value", len(mesh.polygons), np.int32)
-    last = max(0, len(mesh.materials) - 1)
-    return np.clip(slots, 0, max(last, 0)).astype(np.uint16)[faces]
+    slots = read(layer.data, "value", len(mesh.polygons), np.int32)
+    limited: NDArray[np.uint16] = np.clip(slots, 0, 0xFFFF).astype(np.uint16)
+    return limited[faces]
 
 
 def _add_normals(result: Mesh, mesh: Any, corners: I32, faces: I32) -> None:
     """Unit normals where Blender shades smooth; flat faces keep their triangles' own normals."""
     domain = mesh.normals_domain
     if domain == "POINT":
-        result.normals = _read(mesh.vertex_normals, "vector", 3 * len(mesh.vertices), np.float32).reshape(-1, 3)
+        result.normals = read(mesh.vertex_normals, "vector", 3 * len(mesh.vertices), np.float32).reshape(-1, 3)
         result.normals_domain = "POINT"
     elif domain == "CORNER":
-        normals = _read(mesh.corner_normals, "vector", 3 * len(mesh.loops), np.float32).reshape(-1, 3)[corners]
+        normals = read(mesh.corner_normals, "vector", 3 * len(mesh.loops), np.float32).reshape(-1, 3)[corners]
         sharp = mesh.attributes.get("sharp_face")
         if sharp is not None and sharp.domain == "FACE":
-            flat = _read(sharp.data, "value", len(mesh.polygons), np.bool_)[faces]
+            flat = read(sharp.data, "value", len(mesh.polygons), np.bool_)[faces]
             normals.reshape(-1, 3, 3)[flat] = _flat_normals(result, flat)[:, None]
         result.normals = normals
         result.normals_domain = "CORNER"
@@ -103,43 +87,7 @@ def _flat_normals(result: Mesh, chosen: NDArray[np.bool_]) -> F32:
     a, b, c = (result.positions[result.triangles[chosen, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.where(lengths > 0.0, lengths, 1.0)
-
-
-def _add_attributes(
-    result: Mesh, mesh: Any, wanted: set[str], corners: I32, faces: I32, context: ExportContext
-) -> None:
-    active = next((layer for layer in mesh.uv_layers if layer.active_render), None)
-    result.uv_active = active.name if active else ""
-    color_index = mesh.color_attributes.render_color_index
-    result.color_active = mesh.color_attributes[color_index].name if color_index >= 0 else ""
-    names = wanted | ({result.uv_active} if result.uv_active else set())
-    if "" in wanted and result.color_active:
-        names.add(result.color_active)
-    for name in sorted(names):
-        layer = mesh.attributes.get(name) if name else None
-        if layer is not None:
-            attribute = _attribute(layer, corners, faces, result.name, context)
-            if attribute is not None:
-                result.attributes[name] = attribute
-
-
-def _attribute(layer: Any, corners: I32, faces: I32, mesh_name: str, context: ExportContext) -> Attribute | None:
-    """One attribute with the elements of our domains: corners and faces are expanded to triangles."""
-    kind = ATTRIBUTE_TYPES.get(layer.data_type)
-    if kind is None or layer.domain not in ("POINT", "CORNER", "FACE"):
-        context.warn(
-            f'Mesh "{mesh_name}": attribute "{layer.name}" ({layer.data_type} per {layer.domain.lower()}) cannot be read'
-            " by shaders and gives 0. Convert it with Attribute > Convert."
-        )
-        return None
-    value, channels, dtype = kind
-    data = _read(layer.data, value, channels * len(layer.data), dtype).reshape(-1, channels)
-    if layer.domain == "CORNER":
-        data = data[corners]
-    elif layer.domain == "FACE":
-        data = data[faces]
-    return Attribute(np.ascontiguousarray(data, dtype=np.float32), layer.domain)
+    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0), dtype=np.float32)
 
 
 def _without_invalid(result: Mesh, context: ExportContext) -> Mesh | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import bpy
 import numpy as np
 from luch.scene import Scene
 
@@ -18,8 +17,8 @@ from .world import export_world
 
 
 def export_scene(
-    depsgraph: bpy.types.Depsgraph,
-    engine: bpy.types.RenderEngine | None = None,
+    depsgraph: Any,
+    engine: Any = None,
     *,
     cache: MeshCache | None = None,
 ) -> Scene:
@@ -41,7 +40,7 @@ def export_scene(
     return result
 
 
-def _camera(context: ExportContext, engine: bpy.types.RenderEngine | None) -> Any:
+def _camera(context: ExportContext, engine: Any) -> Any:
     chosen = (engine.camera_override if engine else None) or context.scene.camera
     return chosen.evaluated_get(context.depsgraph) if chosen is not None and not chosen.is_evaluated else chosen
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
+from typing import Any
+
 import numpy as np
 from luch.scene import Settings
 
@@ -45,7 +46,7 @@ def export_settings(context: ExportContext) -> Settings:
     return settings
 
 
-def _seed(scene: bpy.types.Scene) -> int:
+def _seed(scene: Any) -> int:
     """The seed of this frame: another one in every frame if the user asks so."""
     seed = int(effective(scene, "seed"))
     if not effective(scene, "use_animated_seed"):
@@ -54,7 +55,7 @@ def _seed(scene: bpy.types.Scene) -> int:
     return int(np.random.SeedSequence([seed, scene.frame_current & 0xFFFFFFFF]).generate_state(1)[0] >> 1)
 
 
-def _threads(scene: bpy.types.Scene) -> int:
+def _threads(scene: Any) -> int:
     if scene.luch.threads:
         return int(scene.luch.threads)
     return scene.render.threads if scene.render.threads_mode == "FIXED" else 0

@@ -7,13 +7,12 @@ from typing import Any
 from luch.scene import World
 
 from .context import ExportContext
+from .nodes import compile_world
 from .visibility import CAMERA, DIFFUSE, GLOSSY, SHADOW, TRANSMISSION, VOLUME
 
 
 def export_world(context: ExportContext) -> World | None:
     """The view layer's world; None: black."""
-    from .nodes import compile_world
-
     layer = context.view_layer
     world: Any = layer.world_override or context.scene.world
     if world is None or not layer.use_sky:

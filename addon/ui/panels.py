@@ -12,17 +12,18 @@ from ..settings import effective, follows_cycles
 class LuchPanel:
     """Shown while Luch is the scene's engine."""
 
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
+    bl_space_type: Any = "PROPERTIES"
+    bl_region_type: Any = "WINDOW"
     bl_context = "render"
     COMPAT_ENGINES = {"LUCH"}
+    layout: Any
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, context: Any) -> bool:
         return context.engine in cls.COMPAT_ENGINES
 
 
-def draw_settings(layout: Any, scene: bpy.types.Scene, *names: str) -> None:
+def draw_settings(layout: Any, scene: Any, *names: str) -> None:
     """One row a setting; where Cycles' value holds, it stands beside."""
     layout.use_property_split = True
     layout.use_property_decorate = False
@@ -39,7 +40,7 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
 
     bl_label = "Sampling"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         draw_settings(self.layout, context.scene, "samples", "time_limit", "seed", "use_animated_seed")
         self.layout.prop(context.scene.luch, "follow_cycles")
 
@@ -51,7 +52,7 @@ class LUCH_RENDER_PT_lights(LuchPanel, bpy.types.Panel):
     bl_parent_id = "LUCH_RENDER_PT_sampling"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         draw_settings(self.layout, context.scene, "use_light_tree", "light_sampling_threshold")
 
 
@@ -61,7 +62,7 @@ class LUCH_RENDER_PT_light_paths(LuchPanel, bpy.types.Panel):
     bl_label = "Light Paths"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         draw_settings(
             self.layout,
             context.scene,
@@ -82,7 +83,7 @@ class LUCH_RENDER_PT_bias(LuchPanel, bpy.types.Panel):
     bl_parent_id = "LUCH_RENDER_PT_light_paths"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         draw_settings(
             self.layout,
             context.scene,
@@ -100,7 +101,7 @@ class LUCH_RENDER_PT_film(LuchPanel, bpy.types.Panel):
     bl_label = "Film"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         scene = context.scene
         draw_settings(self.layout, scene, "film_exposure", "pixel_filter_type", "filter_width")
         self.layout.prop(scene.render, "film_transparent")
@@ -114,7 +115,7 @@ class LUCH_RENDER_PT_performance(LuchPanel, bpy.types.Panel):
     bl_label = "Performance"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         scene = context.scene
         draw_settings(self.layout, scene, "device", "accelerator", "threads")
         self.layout.prop(scene.render, "use_persistent_data")
@@ -126,7 +127,7 @@ class LUCH_VIEWLAYER_PT_passes(LuchPanel, bpy.types.Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         layout: Any = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False

@@ -29,6 +29,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    for panel in bpy.types.Panel.__subclasses__():
+    panels: list[Any] = bpy.types.Panel.__subclasses__()
+    for panel in panels:
         if ENGINE in getattr(panel, "COMPAT_ENGINES", ()):
             panel.COMPAT_ENGINES.discard(ENGINE)
