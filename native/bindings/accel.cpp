@@ -7,6 +7,7 @@
 
 #include "bindings/bind.h"
 #include "cpu/accel/accel.h"
+#include "luch/geometry/surface.h"
 
 namespace luch::bindings {
 namespace {
@@ -18,9 +19,10 @@ using cpu::Accel;
 
 constexpr size_t RAYS_PER_CHUNK = 4096;
 static_assert(sizeof(Ray) == 32);
+constexpr Affine IDENTITY = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
 
 class MeshAccel {
-  public:
+ public:
     MeshAccel(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags, bool brute_force,
               unsigned threads)
         : pool_(threads) {
@@ -30,7 +32,7 @@ class MeshAccel {
         mesh.vertex_count = u32(positions.shape(0));
         mesh.triangle_count = u32(triangles.shape(0));
         InstanceView instance = {};
-        instance.to_world = instance.to_object = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+        instance.to_world = instance.to_object = IDENTITY;
         instance.visibility = RAY_ALL;
         SceneView scene = {};
         scene.positions = positions.data();
@@ -40,7 +42,8 @@ class MeshAccel {
         scene.mesh_count = scene.instance_count = 1;
         std::vector<std::vector<u8>> mesh_flags = {{flags.data(), flags.data() + flags.size()}};
         py::gil_scoped_release release;
-        accel_ = Accel::build(scene, mesh_flags, pool_, brute_force ? cpu::AccelKind::BRUTE_FORCE : cpu::AccelKind::BVH);
+        accel_ =
+            Accel::build(scene, mesh_flags, pool_, brute_force ? cpu::AccelKind::BRUTE_FORCE : cpu::AccelKind::BVH);
     }
 
     py::tuple closest(const FloatArray& rays) {
@@ -91,10 +94,25 @@ class MeshAccel {
         return out;
     }
 
-  private:
+ private:
     cpu::ThreadPool pool_;
     std::unique_ptr<Accel> accel_;
 };
+
+// Rays that leave points of triangles: corners (N, 9), barycentrics (N, 2), directions (N, 3) -> rays (N, 8).
+FloatArray spawn_rays(const FloatArray& corners, const FloatArray& uv, const FloatArray& directions) {
+    py::ssize_t count = corners.shape(0);
+    FloatArray rays(std::vector<py::ssize_t>{count, 8});
+    Ray* out = reinterpret_cast<Ray*>(rays.mutable_data());
+    for (py::ssize_t i = 0; i < count; ++i) {
+        const Vec3* p = reinterpret_cast<const Vec3*>(corners.data() + 9 * i);
+        Vec3 d = *reinterpret_cast<const Vec3*>(directions.data() + 3 * i);
+        SurfacePoint s = triangle_point(p[0], p[1], p[2], uv.data()[2 * i], uv.data()[2 * i + 1], IDENTITY, IDENTITY);
+        Vec3 n = normalize_or(cross(p[1] - p[0], p[2] - p[0]), make_vec3(0.0f, 0.0f, 1.0f));
+        out[i] = {offset_origin(s.p, s.error, n, d), 0.0f, d, INFINITE_DISTANCE};
+    }
+    return rays;
+}
 
 }  // namespace
 
@@ -105,6 +123,7 @@ void bind_accel(py::module_& m) {
         .def("closest", &MeshAccel::closest)
         .def("any", &MeshAccel::any)
         .def("stats", &MeshAccel::stats);
+    m.def("spawn_rays", &spawn_rays, "Rays off triangles by their error bound, for tests of the bound.");
 }
 
 }  // namespace luch::bindings

@@ -11,7 +11,7 @@
 namespace luch::cpu {
 
 class ThreadPool {
-  public:
+ public:
     // threads 0: as many as this process may run on. The calling thread counts as one of them.
     explicit ThreadPool(unsigned threads = 0);
     ~ThreadPool();
@@ -27,14 +27,15 @@ class ThreadPool {
     template <class Body>
     void parallel_for(size_t count, size_t grain, Body&& body) {
         using B = std::remove_reference_t<Body>;
-        run(count, grain ? grain : 1,
+        run(
+            count, grain ? grain : 1,
             [](void* context, size_t begin, size_t end, unsigned worker) {
                 (*static_cast<B*>(context))(begin, end, worker);
             },
             const_cast<void*>(static_cast<const void*>(&body)));
     }
 
-  private:
+ private:
     using Chunk = void (*)(void* context, size_t begin, size_t end, unsigned worker);
     void run(size_t count, size_t grain, Chunk chunk, void* context);
 

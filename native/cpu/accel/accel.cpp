@@ -59,13 +59,13 @@ Box world_box(const Affine& to_world, const Box& box) {
 float size_of(const Box& box) { return max_f(max_component(abs_v(box.lo)), max_component(abs_v(box.hi))); }
 
 class TwoLevel final : public Accel {
-  public:
+ public:
     TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool, AccelKind kind);
     void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const override;
     void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const override;
     AccelStats stats() const override { return stats_; }
 
-  private:
+ private:
     void plan(const SceneView& scene);
     void add_entry(const SceneView& scene, u32 instance, u32 group);
     void build_groups(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
@@ -119,7 +119,8 @@ void TwoLevel::plan(const SceneView& scene) {
             continue;
         }
         size_t f = 0;
-        while (f < flat.size() && (flat[f].first != instance.visibility || flat_refs[f] + triangles > REF_MASK / 2)) ++f;
+        while (f < flat.size() && (flat[f].first != instance.visibility || flat_refs[f] + triangles > REF_MASK / 2))
+            ++f;
         if (f == flat.size()) {
             flat.push_back({instance.visibility, u32(groups_.size())});
             flat_refs.push_back(0);

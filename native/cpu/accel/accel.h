@@ -24,7 +24,7 @@ enum TriangleFlag : u8 { TRIANGLE_MAY_BE_TRANSPARENT = 1 };
 enum Blocked : u8 { BLOCKED_NOT = 0, BLOCKED_OPAQUE = 1, BLOCKED_MAYBE = 2 };
 
 class Accel {
-  public:
+ public:
     // triangle_flags: per mesh, per triangle TriangleFlag bits; empty, or an empty list: all opaque.
     // The scene's arrays are copied: the view may go away afterwards, the instances too.
     static std::unique_ptr<Accel> build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,

@@ -71,7 +71,7 @@ void sort_by_area(const Child* children, int count, int* order) {
 }
 
 class Builder {
-  public:
+ public:
     Builder(PrimBox* a, PrimBox* b, u32* order, u32 leaf_width, ThreadPool& pool)
         : split_(a, b, leaf_width, pool), order_(order), leaf_width_(leaf_width) {}
 
@@ -84,7 +84,7 @@ class Builder {
         build(task.child, task.depth, task.nodes, nullptr);
     }
 
-  private:
+ private:
     u32 build(const Child& root, u32 depth, std::vector<Node8>& nodes, std::vector<Task>* tasks) {
         u32 index = static_cast<u32>(nodes.size());
         nodes.emplace_back();
@@ -117,8 +117,7 @@ class Builder {
         while (count < 8) {
             int widest = -1;
             for (int i = 0; i < count; ++i)
-                if (!children[i].leaf &&
-                    (widest < 0 || children[i].set.half_area() > children[widest].set.half_area()))
+                if (!children[i].leaf && (widest < 0 || children[i].set.half_area() > children[widest].set.half_area()))
                     widest = i;
             if (widest < 0) break;
             Child& child = children[widest];

@@ -18,7 +18,7 @@ struct Corners3 {
 
 // Reads triangles by ref, in the group's space.
 class Gather {
-  public:
+ public:
     Gather(const Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags)
         : group_(group), scene_(scene), flags_(flags) {}
 
@@ -46,7 +46,7 @@ class Gather {
         return flag & TRIANGLE_MAY_BE_TRANSPARENT ? ref | REF_TRANSPARENT : ref;
     }
 
-  private:
+ private:
     const Group& group_;
     const SceneView& scene_;
     const std::vector<std::vector<u8>>& flags_;
@@ -109,7 +109,8 @@ void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gath
             u32 count = node.count[slot], first = node.child[slot];
             if (count == 0) continue;
             u32 blocks = (count + 3) / 4, block = u32(first_order.size());
-            if (block + blocks > LEAF_FIRST_MASK) throw std::length_error("More than a billion triangles in one mesh or scene.");
+            if (block + blocks > LEAF_FIRST_MASK)
+                throw std::length_error("More than a billion triangles in one mesh or scene.");
             node.child[slot] = LEAF | ((blocks - 1) << LEAF_COUNT_SHIFT) | block;
             for (u32 b = 0; b < blocks; ++b) {
                 first_order.push_back(first + 4 * b);
@@ -136,8 +137,8 @@ void make_list(Group& group, const PrimBox* boxes, size_t kept, const Gather& ga
 }  // namespace
 
 const Member& Group::member_of(u32 ref) const {
-    auto after = std::upper_bound(members.begin(), members.end(), ref,
-                                  [](u32 r, const Member& m) { return r < m.first_ref; });
+    auto after =
+        std::upper_bound(members.begin(), members.end(), ref, [](u32 r, const Member& m) { return r < m.first_ref; });
     return *(after - 1);
 }
 

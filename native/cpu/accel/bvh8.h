@@ -41,7 +41,7 @@ static_assert(sizeof(Block4) == 160);
 // An array that asks for huge pages: incoherent rays then miss the TLB less.
 template <class T>
 class HugeArray {
-  public:
+ public:
     HugeArray() = default;
     explicit HugeArray(size_t size);
     HugeArray(HugeArray&& other) noexcept { swap(other); }
@@ -57,7 +57,7 @@ class HugeArray {
     T& operator[](size_t i) { return data_[i]; }
     const T& operator[](size_t i) const { return data_[i]; }
 
-  private:
+ private:
     void swap(HugeArray& other) {
         std::swap(data_, other.data_);
         std::swap(size_, other.size_);

@@ -21,8 +21,7 @@ struct Rays {
 
 bool lane_hit(const Block4& block, u32 lane, const TriangleRay& ray, float t_min, float t_max, TriangleHit* hit) {
     Vec3 p[3];
-    for (int k = 0; k < 3; ++k)
-        p[k] = {block.vertex[k][0][lane], block.vertex[k][1][lane], block.vertex[k][2][lane]};
+    for (int k = 0; k < 3; ++k) p[k] = {block.vertex[k][0][lane], block.vertex[k][1][lane], block.vertex[k][2][lane]};
     return intersect_triangle(ray, p[0], p[1], p[2], t_min, t_max, hit);
 }
 

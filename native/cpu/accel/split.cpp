@@ -135,8 +135,7 @@ Split Splitter::choose(const PrimSet& set, const Bins& bins) const {
     bool no_cut = !(best_cost < INFINITE_DISTANCE);
     best.leaf = may_stay && !(best_cost + TRAVERSAL_COST * area < area * float(blocks(set.count())));
     best.halve = no_cut;
-    for (int b = 0; b < BINS && !no_cut; ++b)
-        (b < best.bin ? best.left : best.right).merge(bins.box[best.axis][b]);
+    for (int b = 0; b < BINS && !no_cut; ++b) (b < best.bin ? best.left : best.right).merge(bins.box[best.axis][b]);
     return best;
 }
 
@@ -162,10 +161,9 @@ void Splitter::halve(const PrimSet& set, PrimSet* left, PrimSet* right) {
         if (set.centroids.extent(a) > set.centroids.extent(axis)) axis = a;
     auto centre = [axis](const PrimBox& p) { return p.hi[axis] - p.minus_lo[axis]; };
     u32 middle = set.begin + set.count() / 2;
-    std::nth_element(prims + set.begin, prims + middle, prims + set.end,
-                     [&](const PrimBox& a, const PrimBox& b) {
-                         return centre(a) != centre(b) ? centre(a) < centre(b) : a.id < b.id;
-                     });
+    std::nth_element(prims + set.begin, prims + middle, prims + set.end, [&](const PrimBox& a, const PrimBox& b) {
+        return centre(a) != centre(b) ? centre(a) < centre(b) : a.id < b.id;
+    });
     u32 cuts[3] = {set.begin, middle, set.end};
     PrimSet* halves[2] = {left, right};
     for (int side = 0; side < 2; ++side) {

@@ -42,7 +42,7 @@ struct Split {
 PrimSet bound_all(const PrimBox* prims, size_t count, ThreadPool& pool);
 
 class Splitter {
-  public:
+ public:
     static constexpr int BINS = 16;
 
     Splitter(PrimBox* a, PrimBox* b, u32 leaf_width, ThreadPool& pool)
@@ -53,7 +53,7 @@ class Splitter {
     Split find(const PrimSet& set, bool halve, bool parallel);
     void apply(const PrimSet& set, const Split& split, PrimSet* left, PrimSet* right, bool parallel);
 
-  private:
+ private:
     struct Bins {
         Corners box[3][BINS];
         u32 count[3][BINS] = {};

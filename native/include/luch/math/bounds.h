@@ -12,16 +12,17 @@
 //    exactly through its z range. So a box widened by SHEAR_ERROR (extent_x + extent_z) along x and y, not
 //    along z, contains the ray at t; extents are taken over the root box, so they hold for every node.
 //    The slab distance fl(fl(plane - origin') * rdir) has three roundings (difference, reciprocal, product),
-//    t itself one more: rdir is moved by SLAB_SCALE = 4 * 2 EPS, more than the 4 EPS needed.
+//    t itself one more: rdir is moved by 8 EPS, more than the 5 EPS needed.
 //    The difference plane - origin' rounds monotonically, so a parent's interval contains its child's.
 //
 // 2. Point on a triangle (surface.h). b0 p0 + b1 p1 + b2 p2 with b0 = 1 - b1 - b2: each product carries the
 //    barycentric's own error (2 EPS, absolute on b0), a product and two sums: gamma(7) sum |b_i p_i| as in
 //    pbrt-v4 6.8.4. The plane that a later ray meets is that of the sheared vertices of 1., seen from a point
 //    on the triangle: 7 EPS times the triangle's extent.
-//    Through an instance (world = M object): the point's transform adds gamma(3)(|M| |p| + |m|); the later ray
-//    is taken to object space by the inverse with gamma(3)(|M'| |p_world| + |m'|), seen in the world through
-//    |M|; or else the vertices themselves were taken to the world, gamma(3) again. The sum of all covers both.
+//    Through an instance (world = M object + m, back M', m'): the point's transform adds gamma(3)(|M| |p| + |m|);
+//    the later ray is taken to object space by the inverse with gamma(3)(|M'| |p_world| + |m'|), seen in the world
+//    through |M|; or else the vertices themselves were taken to the world, gamma(3)(|M| |v| + |m|) again. M and M'
+//    are rounded versions of each other's inverse: one more each, gamma(4). The sum of all covers both ways.
 #pragma once
 #include "luch/math/vec.h"
 
