@@ -34,9 +34,9 @@ CONTRACTS = {
     ("light", "luch/bsdf/closure.h"),
 }
 ONLY = {  # module -> where it may be imported
-    "bpy": ("addon/", "tests/", "buildtools/inside/"),
+    "bpy": ("addon/", "tests/", "buildtools/inside/", "native/tools/"),
     "cupy": ("native/luch/cuda.py", "native/luch/cuda/", "tests/"),
-    "OpenImageIO": ("native/luch/image.py", "tests/", "buildtools/inside/"),
+    "OpenImageIO": ("native/luch/image.py", "tests/", "buildtools/inside/", "native/tools/"),
 }
 
 

@@ -14,8 +14,9 @@ from buildtools.inside import session
 
 
 def main(options: dict[str, Any]) -> int:
-    from addon.export.scene import export_scene
     from luch.scenefile import write_scene
+
+    from addon.export.scene import export_scene
 
     scene = session.open_file(options["file"])
     if options["frame"] is not None:

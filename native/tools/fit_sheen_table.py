@@ -63,7 +63,7 @@ def render(layer_pass: str) -> np.ndarray:
     scene.render.image_settings.color_depth = "32"
     scene.render.filepath = path
     bpy.ops.render.render(write_still=True)
-    import OpenImageIO as oiio  # noqa: PLC0415  (only bpy's or PyPI's; imported after bpy on purpose)
+    import OpenImageIO as oiio
 
     for part in range(oiio.ImageBuf(path).nsubimages):
         image = oiio.ImageBuf(path, part, 0)
@@ -99,7 +99,7 @@ def set_up_scene() -> bpy.types.Object:
 
 
 def main() -> None:
-    from mathutils import Vector  # noqa: PLC0415
+    from mathutils import Vector
 
     sun = set_up_scene()
     cos = np.tile(np.linspace(0.0, 1.0, SIZE), SIZE)

@@ -16,20 +16,14 @@ TABLE_SIZE = 256  # samples of a ramp or curve, as in Cycles
 # How many inputs each mode of Math reads; the operation is called MATH_ and the mode's name.
 MATH_INPUTS = {
     **dict.fromkeys(
-        (
-            "SQRT INVERSE_SQRT ABSOLUTE EXPONENT SIGN ROUND FLOOR CEIL TRUNC FRACT SINE COSINE TANGENT ARCSINE"
-            " ARCCOSINE ARCTANGENT SINH COSH TANH RADIANS DEGREES"
-        ).split(),
+        ["SQRT", "INVERSE_SQRT", "ABSOLUTE", "EXPONENT", "SIGN", "ROUND", "FLOOR", "CEIL", "TRUNC", "FRACT", "SINE", "COSINE", "TANGENT", "ARCSINE", "ARCCOSINE", "ARCTANGENT", "SINH", "COSH", "TANH", "RADIANS", "DEGREES"],
         1,
     ),
     **dict.fromkeys(
-        (
-            "ADD SUBTRACT MULTIPLY DIVIDE POWER LOGARITHM MINIMUM MAXIMUM LESS_THAN GREATER_THAN MODULO"
-            " FLOORED_MODULO SNAP PINGPONG ARCTAN2"
-        ).split(),
+        ["ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "POWER", "LOGARITHM", "MINIMUM", "MAXIMUM", "LESS_THAN", "GREATER_THAN", "MODULO", "FLOORED_MODULO", "SNAP", "PINGPONG", "ARCTAN2"],
         2,
     ),
-    **dict.fromkeys("MULTIPLY_ADD COMPARE SMOOTH_MIN SMOOTH_MAX WRAP".split(), 3),
+    **dict.fromkeys(["MULTIPLY_ADD", "COMPARE", "SMOOTH_MIN", "SMOOTH_MAX", "WRAP"], 3),
 }
 
 

@@ -13,9 +13,9 @@ from .tree import Compiler, Outputs, emitter, find_socket
 
 # Modes that work on each component alone: the Math operation and how many vectors it reads.
 _EACH = {
-    **dict.fromkeys("FLOOR CEIL ABSOLUTE SINE COSINE TANGENT SIGN ROUND".split(), 1),
-    **dict.fromkeys("ADD SUBTRACT MULTIPLY DIVIDE SNAP MODULO MINIMUM MAXIMUM POWER".split(), 2),
-    **dict.fromkeys("WRAP MULTIPLY_ADD".split(), 3),
+    **dict.fromkeys(["FLOOR", "CEIL", "ABSOLUTE", "SINE", "COSINE", "TANGENT", "SIGN", "ROUND"], 1),
+    **dict.fromkeys(["ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "SNAP", "MODULO", "MINIMUM", "MAXIMUM", "POWER"], 2),
+    **dict.fromkeys(["WRAP", "MULTIPLY_ADD"], 3),
 }
 _PAIRS_TO_VECTOR = ("CROSS_PRODUCT", "PROJECT", "REFLECT")
 _PAIRS_TO_VALUE = ("DOT_PRODUCT", "DISTANCE")

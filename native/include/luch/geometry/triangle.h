@@ -37,7 +37,7 @@ LUCH_FN TriangleRay make_triangle_ray(Vec3 origin, Vec3 direction) {
     r.shear_x = direction[r.kx] / dz;
     r.shear_y = direction[r.ky] / dz;
     r.scale_z = 1.0f / dz;
-    r.scale_z_exact = 1.0 / double(dz);
+    r.scale_z_exact = 1 / double(dz);
     return r;
 }
 
