@@ -6,6 +6,7 @@
 namespace luch::bindings {
 namespace py = pybind11;
 
+void bind_bsdf(py::module_& m);
 void bind_camera(py::module_& m);
 void bind_film(py::module_& m);
 void bind_accel(py::module_& m);

@@ -2,6 +2,7 @@
 
 PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     m.doc() = "Luch's native core.";
+    luch::bindings::bind_bsdf(m);
     luch::bindings::bind_camera(m);
     luch::bindings::bind_film(m);
     luch::bindings::bind_math(m);
