@@ -5,6 +5,7 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_bsdf(m);
     luch::bindings::bind_camera(m);
     luch::bindings::bind_film(m);
+    luch::bindings::bind_light(m);
     luch::bindings::bind_math(m);
     luch::bindings::bind_accel(m);
     luch::bindings::bind_sampling(m);

@@ -33,7 +33,7 @@ struct LampHit {
     Vec3 normal;
 };
 
-// Implemented in light/sample.h, light/lamp.h, light/tree.h, light/world.h, light/triangle.h:
+// Implemented in light/sample.h (which includes the rest: lamp, triangle, tree, world, closest_lamp):
 //   LightSample sample_light(const SceneView&, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u);
 //     n: shading normal (zero vector inside a volume); transmits: light from behind n counts too.
 //     A caller whose closures have normals of their own (bump per closure) passes transmits = true or n = 0:
@@ -42,7 +42,8 @@ struct LampHit {
 //                      Vec3 direction, float distance);   // what sample_light would have had; 0: not a light
 //   float pdf_lamp(const SceneView&, Vec3 p, Vec3 n, bool transmits, const LampHit&, Vec3 direction);
 //   float pdf_world(const SceneView&, Vec3 p, Vec3 n, bool transmits, Vec3 direction);
-//   LampHit closest_lamp(const SceneView&, const Ray&, u32 ray_kind);  // unit direction; lamps of finite size
+//   LampHit closest_lamp(const SceneView&, const Ray&, u32 ray_kind);  // lamps of finite size. Unit direction.
+//     Lamps let rays through: to go on, ask again with the same origin and t_min = t of the hit.
 //   LampHit sun_hit(const SceneView&, u32 sun, Vec3 direction, u32 ray_kind);  // sun in [0, sun_count):
 //     what a ray that leaves the scene sees of that sun; lamp = NONE outside its disk. pdf_lamp takes it.
 
@@ -74,7 +75,7 @@ struct LampView {
     float random;
     u32 visibility, lightgroup;
     u32 max_bounces;
-    u32 emitter;                // index into LightsView::emitters
+    u32 emitter;                // index into LightsView::emitters; of a sun: into suns; NONE: gives no light
 };
 
 struct LightTreeNode;  // light/tree.h
@@ -85,9 +86,10 @@ struct WorldLight {
     bool present, constant;
     Color radiance;             // constant
     u32 width, height;          // importance map, bilinear between texel centres
-    const float* density;       // height * width: luminance times cos(latitude), normalised: see light/world.h
+    const float* density;       // height * width, per unit square of (longitude, latitude): see light/world.h
     const float* row_cdf;       // height + 2
     const float* column_cdf;    // (height + 1) * (width + 1)
+    float irradiance;           // pi times the mean luminance; 0: never sampled
     u32 visibility, lightgroup;
     bool has_sun;               // an extra cone around the sun of a sky texture
     Vec3 sun_direction;
@@ -100,10 +102,11 @@ struct LightsView {
     const LightTreeNode* nodes;         // nodes[0]: the root
     const u32* instance_emitters;       // per instance: offset into triangle_emitters; NONE: emits nothing
     const u32* triangle_emitters;       // emitter of each triangle of such instances; NONE
-    const LampBoxNode* boxes;
+    const LampBoxNode* boxes;           // boxes[0]: the root
     const u32* suns;                    // lamp indices
-    const float* sun_energy;
+    const float* sun_irradiance;        // luminance
     u32 lamp_count, emitter_count, node_count, box_count, sun_count;
+    u32 hittable;                       // RayKind bits of the rays that can hit any lamp of finite size
     bool uniform;                       // light tree off: every emitter is as likely
     WorldLight world;
 };

@@ -1,0 +1,101 @@
+// The world's importance map.
+#include <cmath>
+
+#include "cpu/light/build.h"
+#include "luch/light/world.h"
+
+namespace luch::cpu {
+namespace {
+
+float usable_luminance(Color c) {
+    float l = luminance(abs_v(c));
+    return finite_f(l) ? l : 0.0f;  // a broken texel must not own the map
+}
+
+// Rises from exactly 0 to exactly 1; row `of` masses.
+void fill_cdf(const std::vector<double>& masses, float* cdf) {
+    double total = 0.0, running = 0.0;
+    for (double m : masses) total += m;
+    cdf[0] = 0.0f;
+    for (size_t i = 0; i < masses.size(); ++i) {
+        running += masses[i];
+        cdf[i + 1] = total > 0.0 ? static_cast<float>(running / total)
+                                 : static_cast<float>(i + 1) / static_cast<float>(masses.size());
+    }
+    cdf[masses.size()] = 1.0f;
+}
+
+double build_map(const WorldInput& in, WorldArrays* a) {
+    const size_t width = static_cast<size_t>(in.map_width), height = static_cast<size_t>(in.map_height);
+    a->density.resize(width * height);
+    for (size_t y = 0; y < height; ++y) {
+        double latitude = 3.14159265358979 * ((static_cast<double>(y) + 0.5) / static_cast<double>(height) - 0.5);
+        for (size_t x = 0; x < width; ++x) {
+            const float* c = in.map_rgb + 3 * (y * width + x);
+            a->density[y * width + x] = usable_luminance({c[0], c[1], c[2]}) * static_cast<float>(std::cos(latitude));
+        }
+    }
+    std::vector<double> rows(height + 1), columns(width);
+    a->row_cdf.resize(height + 2);
+    a->column_cdf.resize((height + 1) * (width + 1));
+    double integral = 0.0;  // of density over the unit square
+    for (size_t row = 0; row <= height; ++row) {
+        const float* below = &a->density[(row == 0 ? 0 : row - 1) * width];
+        const float* above = &a->density[(row == height ? row - 1 : row) * width];
+        double share = (row == 0 || row == height) ? 0.5 : 1.0;
+        rows[row] = 0.0;
+        for (size_t x = 0; x < width; ++x) {
+            size_t right = x + 1 == width ? 0 : x + 1;
+            columns[x] = 0.25 * (static_cast<double>(below[x]) + below[right] + above[x] + above[right]);
+            rows[row] += columns[x] * share;
+        }
+        fill_cdf(columns, &a->column_cdf[row * (width + 1)]);
+        integral += rows[row];
+    }
+    fill_cdf(rows, a->row_cdf.data());
+    integral /= static_cast<double>(width) * static_cast<double>(height);
+    double scale = integral > 0.0 ? 1.0 / integral : 0.0;
+    for (float& d : a->density) d = static_cast<float>(d * scale);
+    return integral;
+}
+
+}  // namespace
+
+WorldLight build_world(const WorldInput& in, WorldArrays* arrays) {
+    WorldLight w{};
+    w.present = in.present;
+    w.constant = in.constant || in.map_rgb == nullptr || in.map_width < 1 || in.map_height < 1;
+    w.visibility = in.visibility;
+    w.lightgroup = in.lightgroup;
+    if (!in.present) return w;
+    w.radiance = finite_v(in.constant_radiance) ? in.constant_radiance : Color{0.0f, 0.0f, 0.0f};
+    double map_irradiance = PI * usable_luminance(w.radiance);
+    if (!w.constant) {
+        // Mean over the sphere is integral * pi / 2 (the density holds a cosine whose mean is 2 / pi).
+        map_irradiance = build_map(in, arrays) * 3.14159265358979 * 3.14159265358979 / 2.0;
+        w.width = static_cast<u32>(in.map_width);
+        w.height = static_cast<u32>(in.map_height);
+        w.density = arrays->density.data();
+        w.row_cdf = arrays->row_cdf.data();
+        w.column_cdf = arrays->column_cdf.data();
+    }
+    double sine = std::sin(0.25 * in.sun_angle), disk = std::sin(0.5 * in.sun_angle);
+    double sun_irradiance = in.has_sun ? 3.14159265358979 * disk * disk * usable_luminance(in.sun_radiance) : 0.0;
+    w.has_sun = sun_irradiance > 0.0 && in.sun_angle > 1e-6f;
+    if (w.has_sun) {
+        w.sun_direction = normalize_or(in.sun_direction, {0.0f, 0.0f, 1.0f});
+        w.sun_one_minus_cos = static_cast<float>(2.0 * sine * sine);
+        double share = sun_irradiance / (sun_irradiance + map_irradiance);
+        // A map that is black beside its sun needs no part of its own.
+        w.sun_probability = map_irradiance > 0.0 ? static_cast<float>(0.1 + 0.8 * share) : 0.999f;
+    }
+    w.irradiance = static_cast<float>(std::fmin(map_irradiance + sun_irradiance, 1e30));
+    return w;
+}
+
+Vec3 world_map_direction(int width, int height, int x, int y) {
+    return equirectangular_direction((static_cast<float>(x) + 0.5f) / static_cast<float>(width),
+                                     (static_cast<float>(y) + 0.5f) / static_cast<float>(height));
+}
+
+}  // namespace luch::cpu

@@ -1,0 +1,351 @@
+// One lamp: a sample of it, its pdf, its intersection with a ray. No choice among lamps here: every
+// pdf is conditional on this lamp. Semantics of looks and units are Blender's (Cycles 5.2).
+#pragma once
+#include "luch/light/light.h"
+#include "luch/light/polygon.h"
+
+namespace luch {
+
+struct LampSample {
+    bool valid;
+    Vec3 direction;
+    float distance, pdf_sa;   // delta lamps: 1
+    Color radiance;
+    float u, v;
+    Vec3 point, normal;
+};
+
+LUCH_FN Vec3 lamp_local_direction(const LampView& lamp, Vec3 d) {
+    const float* m = lamp.to_local;
+    return {m[0] * d.x + m[1] * d.y + m[2] * d.z, m[3] * d.x + m[4] * d.y + m[5] * d.z,
+            m[6] * d.x + m[7] * d.y + m[8] * d.z};
+}
+
+// ---- looks ---------------------------------------------------------------------------------------
+
+// How much of a spot's light leaves along `outward` (unit, from the lamp). Cosine measured in the lamp's own
+// space, where a scaled lamp's cone is round.
+LUCH_FN float spot_attenuation(const LampView& lamp, Vec3 outward) {
+    Vec3 local = normalize_or(lamp_local_direction(lamp, outward), {0.0f, 0.0f, 1.0f});
+    float x = saturate_f((-local.z - lamp.cos_half_spot) * lamp.spot_scale);
+    return x * x * (3.0f - 2.0f * x);
+}
+
+// A soft box: the share of light that the slats of a grid let through, with the total flux kept.
+LUCH_FN float spread_attenuation(const LampView& lamp, Vec3 outward) {
+    if (lamp.tan_half_spread == INFINITE_DISTANCE) return 1.0f;
+    float c = dot(outward, lamp.direction);
+    if (!(c > 0.0f)) return 0.0f;
+    float tangent = length(cross(outward, lamp.direction)) / c;
+    return max_f(lamp.tan_half_spread - tangent, 0.0f) * lamp.spread_scale;
+}
+
+// What Geometry > Parametric gives on the lamp. outward: unit, from the lamp towards the shaded point.
+LUCH_FN_SLOW Vec2 lamp_parametric(const LampView& lamp, Vec3 point, Vec3 normal, Vec3 outward) {
+    if (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE) {
+        Vec3 q = point - lamp.position;
+        return {saturate_f(0.5f + 0.5f * safe_divide(dot(q, lamp.axis_u), lamp.half_u)),
+                saturate_f(0.5f + 0.5f * safe_divide(dot(q, lamp.axis_v), lamp.half_v))};
+    }
+    if (lamp.kind == LampKind::SUN) {
+        Vec3 to_sun = -outward, off = to_sun + lamp.direction;
+        float scale = 0.5f * safe_divide(1.0f, sqrt_f(2.0f * lamp.one_minus_cos_half_angle) * length(off));
+        float s = lamp.one_minus_cos_half_angle > 0.0f ? scale : 0.0f;
+        Vec3 local = lamp_local_direction(lamp, to_sun);
+        return {local.x * s + 0.5f, local.y * s + 0.5f};
+    }
+    if (lamp.spot) {
+        Vec3 local = normalize_or(lamp_local_direction(lamp, outward), {0.0f, 0.0f, -1.0f});
+        float scale = safe_divide(lamp.half_cot_half_spot, -local.z);
+        return {local.x * scale + 0.5f, local.y * scale + 0.5f};
+    }
+    Vec3 local = normalize_or(lamp_local_direction(lamp, normal), {0.0f, 0.0f, 1.0f});
+    float around = (local.x == 0.0f && local.y == 0.0f) ? 0.0f : (1.0f - atan2_f(local.x, local.y) * INV_PI) * 0.5f;
+    return {around, 1.0f - acos_f(local.z) * INV_PI};
+}
+
+LUCH_FN Color lamp_radiance_towards(const LampView& lamp, Vec3 outward) {
+    if (lamp.spot) return lamp.radiance * spot_attenuation(lamp, outward);
+    if (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE)
+        return lamp.radiance * spread_attenuation(lamp, outward);
+    return lamp.radiance;
+}
+
+// ---- spheres and disks ---------------------------------------------------------------------------
+
+// 1 - cos of the cone that a sphere fills, from (radius / distance)^2 < 1.
+LUCH_FN float sphere_one_minus_cos(float sin2) { return sin2 / (1.0f + safe_sqrt(1.0f - sin2)); }
+
+// Distance to the first crossing of a sphere in front of the origin; the far side if the origin is inside.
+// from: origin minus centre. Negative: none.
+LUCH_FN float sphere_crossing(Vec3 from, Vec3 direction, float radius) {
+    float b = -dot(from, direction);
+    // Squared distance of the centre from the line, from the closest point itself (Haines et al. 2019).
+    Vec3 nearest = from + direction * b;
+    float root2 = radius * radius - length_squared(nearest);
+    if (!(root2 >= 0.0f)) return -1.0f;
+    float root = sqrt_f(root2);
+    return length_squared(from) > radius * radius ? b - root : b + root;
+}
+
+LUCH_FN float inside_sphere_pdf(Vec3 n, bool transmits, Vec3 direction) {
+    return (transmits || is_zero(n)) ? 0.25f * INV_PI : max_f(dot(n, direction), 0.0f) * INV_PI;
+}
+
+LUCH_FN_SLOW void sample_inside_sphere(const LampView& lamp, Vec3 from, Vec3 n, bool transmits, Vec2 u, LampSample* s) {
+    if (transmits || is_zero(n)) {
+        s->direction = sample_uniform_sphere(u);
+    } else {
+        Vec3 t, b;
+        make_frame(n, &t, &b);
+        s->direction = to_world(sample_cosine_hemisphere(u), t, b, n);
+    }
+    s->pdf_sa = inside_sphere_pdf(n, transmits, s->direction);
+    s->distance = sphere_crossing(from, s->direction, lamp.radius);
+    Vec3 outward_normal = normalize_or(from + s->direction * s->distance, -s->direction);
+    s->normal = outward_normal;
+    s->point = lamp.position + outward_normal * lamp.radius;
+    s->radiance = lamp.radiance;  // a spot's cone does not shade its inside
+    s->valid = s->pdf_sa > 0.0f && s->distance > 0.0f;
+}
+
+LUCH_FN_SLOW LampSample sample_sphere(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec2 u) {
+    LampSample s{};
+    Vec3 to = lamp.position - p;
+    float d2 = length_squared(to), r2 = lamp.radius * lamp.radius;
+    if (!(d2 > r2)) {
+        sample_inside_sphere(lamp, -to, n, transmits, u, &s);
+        return s;
+    }
+    float d = sqrt_f(d2);
+    float visible = sphere_one_minus_cos(r2 / d2);
+    Vec3 axis = to / d, t, b;
+    if (lamp.spot && lamp.spot_one_minus_cos < visible) {
+        // Close to a large spot only directions within its cone matter.
+        axis = -lamp.direction;
+        make_frame(axis, &t, &b);
+        s.direction = to_world(sample_cone(lamp.spot_one_minus_cos, u), t, b, axis);
+        s.pdf_sa = 1.0f / (TWO_PI * lamp.spot_one_minus_cos);
+        s.distance = sphere_crossing(-to, s.direction, lamp.radius);
+        s.normal = normalize_or(s.direction * s.distance - to, -s.direction);
+    } else {
+        make_frame(axis, &t, &b);
+        Vec3 local = sample_cone(visible, u);
+        s.direction = to_world(local, t, b, axis);
+        s.pdf_sa = 1.0f / (TWO_PI * visible);
+        // Within the plane of centre, origin and direction; the lateral part alone carries the digits.
+        float sin2 = local.x * local.x + local.y * local.y;
+        s.distance = d * local.z - safe_sqrt(r2 - d2 * sin2);
+        float scale = s.distance / lamp.radius;
+        float axial = safe_sqrt(1.0f - scale * scale * sin2);
+        s.normal = (t * local.x + b * local.y) * scale - axis * axial;
+    }
+    s.point = lamp.position + s.normal * lamp.radius;
+    s.radiance = lamp_radiance_towards(lamp, -s.direction);
+    s.valid = s.distance > 0.0f;
+    return s;
+}
+
+LUCH_FN float sphere_pdf(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec3 direction) {
+    float d2 = length_squared(lamp.position - p), r2 = lamp.radius * lamp.radius;
+    if (!(d2 > r2)) return inside_sphere_pdf(n, transmits, direction);
+    float visible = sphere_one_minus_cos(r2 / d2);
+    return 1.0f / (TWO_PI * (lamp.spot ? min_f(visible, lamp.spot_one_minus_cos) : visible));
+}
+
+// Soft falloff: a disk of the lamp's radius that always faces the shaded point.
+LUCH_FN_SLOW LampSample sample_facing_disk(const LampView& lamp, Vec3 p, Vec2 u) {
+    LampSample s{};
+    Vec3 to = lamp.position - p;
+    float d = length(to);
+    if (!(d > 0.0f && finite_f(d))) return s;
+    Vec3 axis = to / d, t, b;
+    make_frame(axis, &t, &b);
+    Vec2 q = sample_disk(u);
+    Vec3 offset = (t * q.x + b * q.y) * lamp.radius;
+    Vec3 along = to + offset;
+    s.distance = length(along);
+    s.direction = along / s.distance;
+    s.point = lamp.position + offset;
+    s.normal = -s.direction;
+    s.pdf_sa = area_pdf_sa(s.distance, d, PI * lamp.radius * lamp.radius);
+    s.radiance = lamp_radiance_towards(lamp, -s.direction);
+    s.valid = true;
+    return s;
+}
+
+// ---- area lamps ----------------------------------------------------------------------------------
+
+// Where on an area lamp samples fall, seen from one point: a rectangle in the lamp's axes (origin below the
+// shaded point), or a disk or ellipse inside which they are uniform by area.
+struct AreaRegion {
+    bool any, round;
+    RectangleCone box;          // round: its bounding box
+    float shift_x, shift_y;     // of the lamp's centre from the shaded point's foot
+};
+
+LUCH_FN_SLOW AreaRegion make_area_region(const LampView& lamp, Vec3 p) {
+    AreaRegion r{};
+    Vec3 from = p - lamp.position;
+    float height = dot(from, lamp.direction);
+    if (!(height > 0.0f)) return r;
+    r.shift_x = -dot(from, lamp.axis_u);
+    r.shift_y = -dot(from, lamp.axis_v);
+    float x0 = r.shift_x - lamp.half_u, x1 = r.shift_x + lamp.half_u;
+    float y0 = r.shift_y - lamp.half_v, y1 = r.shift_y + lamp.half_v;
+    bool ellipse = lamp.kind == LampKind::ELLIPSE;
+    r.round = ellipse;
+    if (lamp.tan_half_spread != INFINITE_DISTANCE) {
+        // Only what lies within the spread's circle around the foot sends light here.
+        float reach = height * lamp.tan_half_spread;
+        float ellipse_area = (x1 - x0) * (y1 - y0) * QUARTER_PI;
+        x0 = max_f(x0, -reach);
+        x1 = min_f(x1, reach);
+        y0 = max_f(y0, -reach);
+        y1 = min_f(y1, reach);
+        if (!(x0 < x1 && y0 < y1)) return r;
+        if (ellipse) r.round = ellipse_area <= (x1 - x0) * (y1 - y0);
+        if (r.round) {
+            x0 = r.shift_x - lamp.half_u;
+            x1 = r.shift_x + lamp.half_u;
+            y0 = r.shift_y - lamp.half_v;
+            y1 = r.shift_y + lamp.half_v;
+        }
+    }
+    r.box = make_rectangle_cone(x0, x1, y0, y1, height);
+    // A wide ellipse: uniform in the solid angle of its box, a fifth of the samples lost, beats uniform by area.
+    if (r.box.solid_angle > 0.3f) r.round = false;
+    r.any = true;
+    return r;
+}
+
+LUCH_FN float area_region_pdf(const AreaRegion& r, float distance) {
+    if (!r.any) return 0.0f;
+    if (r.round) return area_pdf_sa(distance, r.box.height, (r.box.x1 - r.box.x0) * (r.box.y1 - r.box.y0) * QUARTER_PI);
+    return rectangle_cone_pdf(r.box, distance);
+}
+
+LUCH_FN bool on_area_lamp(const LampView& lamp, float x, float y) {
+    if (lamp.kind == LampKind::RECTANGLE) return abs_f(x) <= lamp.half_u && abs_f(y) <= lamp.half_v;
+    return sqr(x / lamp.half_u) + sqr(y / lamp.half_v) <= 1.0f;
+}
+
+LUCH_FN_SLOW LampSample sample_area(const LampView& lamp, Vec3 p, Vec2 u) {
+    LampSample s{};
+    AreaRegion r = make_area_region(lamp, p);
+    if (!r.any) return s;
+    Vec2 q;
+    if (r.round) {
+        Vec2 d = sample_disk(u);
+        q = {r.shift_x + d.x * lamp.half_u, r.shift_y + d.y * lamp.half_v};
+    } else {
+        q = sample_rectangle_cone(r.box, u);
+        if (lamp.kind == LampKind::ELLIPSE && !on_area_lamp(lamp, q.x - r.shift_x, q.y - r.shift_y)) return s;
+    }
+    Vec3 along = lamp.axis_u * q.x + lamp.axis_v * q.y - lamp.direction * r.box.height;
+    s.distance = length(along);
+    s.direction = along / s.distance;
+    s.point = p + along;
+    s.normal = lamp.direction;
+    s.pdf_sa = area_region_pdf(r, s.distance);
+    s.radiance = lamp_radiance_towards(lamp, -s.direction);
+    s.valid = s.pdf_sa > 0.0f && s.distance > 0.0f;
+    return s;
+}
+
+// No spread at all: parallel light from the lamp's outline.
+LUCH_FN LampSample sample_parallel_area(const LampView& lamp, Vec3 p) {
+    LampSample s{};
+    Vec3 from = p - lamp.position;
+    s.distance = dot(from, lamp.direction);
+    s.valid = s.distance > 0.0f && on_area_lamp(lamp, dot(from, lamp.axis_u), dot(from, lamp.axis_v));
+    s.direction = -lamp.direction;
+    s.point = p + s.direction * s.distance;
+    s.normal = lamp.direction;
+    s.radiance = lamp.radiance;
+    s.pdf_sa = 1.0f;
+    return s;
+}
+
+// ---- suns and the whole --------------------------------------------------------------------------
+
+LUCH_FN LampSample sample_sun(const LampView& lamp, Vec2 u) {
+    LampSample s{};
+    Vec3 axis = -lamp.direction, t, b;
+    make_frame(axis, &t, &b);
+    s.direction = lamp.delta ? axis : to_world(sample_cone(lamp.one_minus_cos_half_angle, u), t, b, axis);
+    s.pdf_sa = lamp.delta ? 1.0f : 1.0f / (TWO_PI * lamp.one_minus_cos_half_angle);
+    s.distance = INFINITE_DISTANCE;
+    s.point = s.direction;
+    s.normal = -s.direction;
+    s.radiance = lamp.radiance;
+    s.valid = true;
+    return s;
+}
+
+LUCH_FN LampSample sample_point(const LampView& lamp, Vec3 p) {
+    LampSample s{};
+    Vec3 to = lamp.position - p;
+    s.distance = length(to);
+    if (!(s.distance > 0.0f)) return s;
+    s.direction = to / s.distance;
+    s.point = lamp.position;
+    s.normal = -s.direction;
+    s.pdf_sa = 1.0f;
+    s.radiance = lamp_radiance_towards(lamp, -s.direction) * (1.0f / (s.distance * s.distance));
+    s.valid = finite_v(s.radiance);
+    return s;
+}
+
+LUCH_FN_SLOW LampSample sample_lamp(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec2 u) {
+    LampSample s;
+    if (lamp.kind == LampKind::SUN) {
+        s = sample_sun(lamp, u);
+    } else if (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE) {
+        s = lamp.delta ? sample_parallel_area(lamp, p) : sample_area(lamp, p, u);
+    } else if (lamp.delta) {
+        s = sample_point(lamp, p);
+    } else {
+        s = lamp.kind == LampKind::DISK ? sample_facing_disk(lamp, p, u) : sample_sphere(lamp, p, n, transmits, u);
+    }
+    s.valid = s.valid && !is_zero(s.radiance);
+    if (s.valid && lamp.has_program) {
+        Vec2 uv = lamp_parametric(lamp, s.point, s.normal, -s.direction);
+        s.u = uv.x;
+        s.v = uv.y;
+    }
+    return s;
+}
+
+// Density with which sample_lamp would have chosen this direction. distance: to the hit on the lamp.
+LUCH_FN_SLOW float lamp_pdf(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec3 direction, float distance) {
+    if (lamp.delta) return 0.0f;
+    switch (lamp.kind) {
+        case LampKind::SPHERE: return sphere_pdf(lamp, p, n, transmits, direction);
+        case LampKind::DISK:
+            return area_pdf_sa(distance, length(lamp.position - p), PI * lamp.radius * lamp.radius);
+        case LampKind::SUN: return 1.0f / (TWO_PI * lamp.one_minus_cos_half_angle);
+        default: return area_region_pdf(make_area_region(lamp, p), distance);
+    }
+}
+
+// Distance to the lamp along a unit direction; negative: not hit. A sphere's far side counts only from inside.
+LUCH_FN_SLOW float intersect_lamp(const LampView& lamp, Vec3 origin, Vec3 direction) {
+    Vec3 from = origin - lamp.position;
+    if (lamp.kind == LampKind::SPHERE || lamp.kind == LampKind::DISK) {
+        if (lamp.spot && dot(direction, from) >= 0.0f) return -1.0f;  // a spot's own back shows nothing
+        if (lamp.kind == LampKind::SPHERE) return sphere_crossing(from, direction, lamp.radius);
+        float d2 = length_squared(from);
+        float along = -dot(from, direction);
+        if (!(along > 0.0f)) return -1.0f;
+        float t = d2 / along;
+        return length_squared(from + direction * t) <= lamp.radius * lamp.radius ? t : -1.0f;
+    }
+    float falling = -dot(direction, lamp.direction);
+    if (!(falling > 0.0f)) return -1.0f;  // seen from behind or edge-on
+    float t = dot(from, lamp.direction) / falling;
+    Vec3 q = from + direction * t;
+    return on_area_lamp(lamp, dot(q, lamp.axis_u), dot(q, lamp.axis_v)) ? t : -1.0f;
+}
+
+}  // namespace luch

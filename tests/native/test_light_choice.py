@@ -1,0 +1,242 @@
+"""Emissive triangles, the world and the choice among many emitters."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from luch import core
+
+from tests.support.lights import (
+    TRIANGLE,
+    WORLD,
+    contributions,
+    irradiance,
+    look_down,
+    numbers,
+    polygon_irradiance,
+    rows,
+    sphere_directions,
+)
+
+UP = (0.0, 0.0, 1.0)
+ORIGIN = (0.0, 0.0, 0.0)
+IDENTITY = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
+
+
+def mesh_light(positions: Any, triangles: Any = ((0, 1, 2),), **material: Any) -> Any:
+    mesh = {"positions": np.asarray(positions, np.float32), "triangles": np.asarray(triangles, np.uint32)} | material
+    return core.light.TestLights(meshes=[mesh], instances=[{"matrix": IDENTITY, "mesh": 0}])
+
+
+def quad_lights(count: int, seed: int = 5, **rest: Any) -> Any:
+    """`count` separate small quads all over a cube of 10 m, emitting on one side, of unequal strength."""
+    rng = np.random.default_rng(seed)
+    corner = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * 0.1
+    turns = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
+    positions = (corner @ turns.transpose(0, 2, 1) + rng.uniform(-5, 5, (count, 1, 3))).reshape(-1, 3)
+    base = 4 * np.arange(count)[:, None, None]
+    triangles = (base + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    mesh = {"positions": positions.astype(np.float32), "triangles": triangles.astype(np.uint32), "emission_sampling": 1}
+    return core.light.TestLights(meshes=[mesh], instances=[{"matrix": IDENTITY, "mesh": 0}], **rest)
+
+
+@pytest.mark.parametrize("edge", [1e-3, 1e-2, 0.1, 1.0, 30.0, 1e3])
+@pytest.mark.parametrize("height", [1e-3, 0.1, 1.0, 10.0])
+def test_triangle_light_gives_lamberts_polygon_formula(edge: float, height: float) -> None:
+    h = height * edge
+    corners = np.array([[-edge / 2, -edge / 3, h], [edge / 2, -edge / 3, h], [0.1 * edge, edge / 2, h]])
+    truth = polygon_irradiance(corners, ORIGIN, UP)
+    estimate = contributions(mesh_light(corners), ORIGIN, UP, 1 << 15)
+    assert estimate.mean() == pytest.approx(truth, rel=2e-4)
+    assert estimate.std() < 1.2 * truth
+
+
+def test_noise_of_a_triangle_light_does_not_depend_on_scale() -> None:
+    shape = np.array([[-1, -0.5, 0.8], [0.9, -0.4, 0.8], [0.1, 0.7, 0.8]])
+    noise = [contributions(mesh_light(shape * s), ORIGIN, UP).std() for s in (1e-3, 1.0, 1e3)]
+    assert max(noise) / min(noise) < 1.01
+
+
+@pytest.mark.parametrize("p", [(0.2, 0.1, 0.0), (0.2, 0.1, 0.8), (4.0, 1.0, 0.5), (-30.0, 0.0, 0.0)])
+def test_triangle_samples_are_uniform_in_their_density(p: tuple[float, float, float]) -> None:
+    """Counts of samples in sixteen equal-area cells of the triangle against the integral of the density."""
+    corners = np.array([[-1, -1, 1], [1, -1, 1], [0, 1.5, 1]], float)
+    lights = mesh_light(corners)
+    count = 1 << 14
+    s = lights.sample(rows(p, count), rows(UP, count), False, numbers(count))
+    assert (s["kind"] == TRIANGLE).all()
+    cells = np.floor(np.clip(s["uv"], 0, 0.9999) * 4).astype(int)
+    drawn = np.bincount(cells[:, 0] * 4 + cells[:, 1], minlength=16) / count
+    fine = (np.stack(np.meshgrid(np.arange(400), np.arange(400)), -1).reshape(-1, 2) + 0.5) / 400
+    fine = fine[fine.sum(1) < 1]
+    points = corners[0] + fine[:, :1] * (corners[1] - corners[0]) + fine[:, 1:] * (corners[2] - corners[0])
+    along = points - np.array(p)
+    distance = np.linalg.norm(along, axis=1)
+    direction = (along / distance[:, None]).astype(np.float32)
+    zeros = np.zeros(len(fine), np.uint32)
+    pdf = lights.pdf_triangle(rows(p, len(fine)), rows(UP, len(fine)), False, zeros, zeros, direction, distance)
+    mass = pdf * direction[:, 2] / distance**2  # steradians to area: all cells are alike
+    at = np.floor(fine * 4).astype(int)
+    expected = np.bincount(at[:, 0] * 4 + at[:, 1], weights=mass, minlength=16)
+    np.testing.assert_allclose(drawn, expected / expected.sum(), atol=4e-3)
+    area = 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
+    assert mass.mean() * area == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("side", "lit"), [(1, "below"), (2, "above"), (3, "both")])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_triangles_light_the_side_that_their_material_samples(side: int, lit: str, mirrored: bool) -> None:
+    sign = -1.0 if mirrored else 1.0
+    # Seen from below the corners run clockwise about +z reversed: the front faces -z.
+    mesh = {"positions": np.array([[0, 0, 1], [0, 1, 1], [1, 0, 1]], np.float32) * [sign, 1, 1],
+            "triangles": np.array([[0, 1, 2]], np.uint32), "emission_sampling": side}  # fmt: skip
+    matrix = [sign, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
+    lights = core.light.TestLights(meshes=[mesh], instances=[{"matrix": matrix, "mesh": 0, "mirrored": mirrored}])
+    above = irradiance(lights, (0.2, 0.2, 2.0), (0.0, 0.0, -1.0), 64)
+    below = irradiance(lights, (0.2, 0.2, 0.0), UP, 64)
+    flips = mirrored  # the mesh itself was mirrored too: its own front now faces +z before the instance
+    expect_below = lit == "both" or (lit == "below") != flips
+    expect_above = lit == "both" or (lit == "above") != flips
+    assert (below > 0) == expect_below
+    assert (above > 0) == expect_above
+
+
+@pytest.mark.parametrize(
+    "positions", [[[0, 0, 1]] * 3, [[0, 0, 1], [1, 0, 1], [2, 0, 1]], [[math.nan, 0, 1], [1, 0, 1], [0, 1, 1]]]
+)
+def test_triangles_without_area_or_finite_corners_are_no_lights(positions: Any) -> None:
+    good = [[3, 0, 2], [4, 0, 2], [3, 1, 2]]
+    lights = mesh_light(positions + good, [[0, 1, 2], [3, 4, 5]])
+    alone = mesh_light(good)
+    assert lights.counts()["emitters"] == 1
+    assert irradiance(lights, ORIGIN, UP) == pytest.approx(irradiance(alone, ORIGIN, UP), rel=1e-6)
+
+
+@pytest.mark.parametrize("transmits", [False, True])
+@pytest.mark.parametrize("normal", [UP, (0.6, 0.0, -0.8), ORIGIN])
+@pytest.mark.parametrize("tree", [True, False])
+def test_density_of_a_found_triangle_is_that_of_sampling_it(transmits: bool, normal: Any, tree: bool) -> None:
+    lights = quad_lights(300, light_tree=tree, world={"radiance": [0.5, 0.5, 0.5]},
+                         lamps=[{"shape": "SUN", "matrix": look_down(), "power": 3.0, "angle": 0.1}])  # fmt: skip
+    count = 1 << 13
+    p, n = rows((0.3, 0.2, -0.4), count), rows(normal, count)
+    s = lights.sample(p, n, transmits, numbers(count))
+    found = s["kind"] == TRIANGLE
+    assert found.sum() > 100
+    pdf = lights.pdf_triangle(p[found], n[found], transmits, s["instance"][found], s["prim"][found],
+                              s["direction"][found], s["distance"][found])  # fmt: skip
+    np.testing.assert_allclose(pdf, s["pdf"][found], rtol=1e-3)
+
+
+def test_shares_of_all_triangles_and_the_world_sum_to_one() -> None:
+    """Selection frequency of every emitter equals the probability that the density query implies."""
+    lights = quad_lights(64, world={"radiance": [0.5, 0.5, 0.5]})
+    count = 1 << 16
+    p, n = rows((12.0, 0.0, 0.0), count), rows(ORIGIN, count)
+    s = lights.sample(p, n, False, numbers(count))
+    by_area = 0.02  # each triangle is narrow: its own density is d^2 / (cos area)
+    cosine = np.abs((s["direction"] * s["normal"]).sum(1))
+    of_world = s["kind"] == WORLD
+    used = s["kind"] != 0
+    distance = np.where(used & ~of_world, s["distance"], 1.0)
+    implied = np.where(of_world, s["pdf"] * 4 * math.pi, s["pdf"] * cosine * by_area / distance**2)
+    prim = np.where(of_world, 128, s["prim"])
+    frequency = np.bincount(prim[used], minlength=129) / count
+    share = np.zeros(129)
+    share[prim[used]] = implied[used]
+    chosen = frequency > 0.002
+    np.testing.assert_allclose(frequency[chosen], share[chosen], atol=6e-4, rtol=0.05)
+
+
+@pytest.mark.parametrize("normal", [UP, (0.6, 0.0, -0.8)])
+def test_the_tree_finds_all_light_of_many_emitters(normal: Any) -> None:
+    """The sum over emitters, one by one, equals what the tree samples: nothing that shines here is never chosen."""
+    tree, even = quad_lights(500), quad_lights(500, light_tree=False)
+    for p in ((0.3, 0.2, -0.4), (4.9, -4.9, 4.9), (12.0, 0.0, 0.0)):
+        truth = irradiance(even, p, normal, 1 << 19)
+        assert irradiance(tree, p, normal, 1 << 16) == pytest.approx(truth, rel=0.02)
+
+
+def test_a_thousand_lamps_are_chosen_five_times_better_than_evenly() -> None:
+    rng = np.random.default_rng(8)
+    lamps = [{"shape": "POINT", "matrix": look_down(*rng.uniform(-10, 10, 3)), "radius": 0.05} for _ in range(1024)]
+    tree = core.light.TestLights(lamps=lamps)
+    even = core.light.TestLights(lamps=lamps, light_tree=False)
+    ratios = []
+    for p in rng.uniform(-9, 9, (20, 3)):
+        a, b = contributions(tree, p, UP, 1 << 12), contributions(even, p, UP, 1 << 14)
+        assert a.mean() == pytest.approx(b.mean(), rel=0.5)
+        ratios.append((b.std() / b.mean()) / (a.std() / a.mean()))
+    assert np.median(ratios) > 5  # 6.5 measured: forty times fewer samples for the same noise
+
+
+@pytest.mark.parametrize("normal", [UP, ORIGIN])
+@pytest.mark.parametrize("transmits", [False, True])
+@pytest.mark.parametrize("sun", [False, True])
+def test_world_density_integrates_to_one_and_is_that_of_its_samples(normal: Any, transmits: bool, sun: bool) -> None:
+    rng = np.random.default_rng(2)
+    picture = rng.uniform(0, 1, (16, 32, 3)).astype(np.float32)
+    picture[3, 31] = 40.0
+    extra = {"has_sun": sun, "sun_direction": [0.6, 0.0, 0.8], "sun_angle": 0.3, "sun_radiance": [20.0] * 3}
+    for world in ({"map": picture}, {"radiance": [1.0, 1.0, 1.0]}):
+        lights = core.light.TestLights(world=world | extra)
+        d = sphere_directions(1 << 17)
+        pdf = lights.pdf_world(rows(ORIGIN, len(d)), rows(normal, len(d)), transmits, d)
+        assert pdf.mean() * 4 * math.pi == pytest.approx(1.0, abs=3e-3)
+        count = 1 << 14
+        s = lights.sample(rows(ORIGIN, count), rows(normal, count), transmits, numbers(count))
+        again = lights.pdf_world(rows(ORIGIN, count), rows(normal, count), transmits, s["direction"])
+        np.testing.assert_allclose(again, s["pdf"], rtol=2e-3)
+        moment = (pdf.astype(float)[:, None] * 4 * math.pi * d).mean(0)
+        np.testing.assert_allclose(s["direction"].mean(0), moment, atol=4e-3)
+
+
+def test_a_hot_texel_is_sampled_in_proportion_to_its_tent() -> None:
+    picture = np.full((64, 128, 3), 1.0, np.float32)
+    picture[45, 20] = 1e7
+    lights = core.light.TestLights(world={"map": picture})
+    count = 1 << 14
+    s = lights.sample(rows(ORIGIN, count), rows(ORIGIN, count), False, numbers(count))
+    d = s["direction"].astype(float)
+    x = (0.5 - np.arctan2(d[:, 1], d[:, 0]) / (2 * math.pi)) * 128 - 0.5
+    y = (0.5 + np.arcsin(d[:, 2]) / math.pi) * 64 - 0.5
+    tent = np.clip(1 - np.abs(x - 20), 0, 1) * np.clip(1 - np.abs(y - 45), 0, 1)
+    weight = (1 + (1e7 - 1) * tent) / s["pdf"]  # what an image lookup would give, over the density
+    assert weight.std() / weight.mean() < 0.05
+
+
+@pytest.mark.parametrize("value", [0.0, math.nan, math.inf, -1.0])
+@pytest.mark.parametrize("shape", [(1, 1), (2, 1), (1, 2), (8, 16)])
+def test_black_broken_and_tiny_worlds_stay_finite(value: float, shape: tuple[int, int]) -> None:
+    picture = np.full((*shape, 3), 0.5, np.float32)
+    picture[0, 0] = value
+    lights = core.light.TestLights(world={"map": picture})
+    d = sphere_directions(1 << 10)
+    pdf = lights.pdf_world(rows(ORIGIN, len(d)), rows(UP, len(d)), False, d)
+    assert np.isfinite(pdf).all()
+    s = lights.sample(rows(ORIGIN, len(d)), rows(UP, len(d)), False, numbers(len(d)))
+    used = s["kind"] == WORLD
+    assert np.isfinite(s["direction"][used]).all() and (s["pdf"][used] > 0).all()
+    black = shape == (1, 1) and value != -1.0
+    assert used.all() != black
+
+
+def test_sun_below_the_horizon_gives_way_to_the_lamps() -> None:
+    up = [1.0, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0]
+    lamps = [{"shape": "SUN", "matrix": up, "power": 1e6}, {"shape": "POINT", "matrix": look_down(z=2.0), "power": 1.0}]
+    lights = core.light.TestLights(lamps=lamps)
+    s = lights.sample(rows(ORIGIN, 256), rows(UP, 256), False, numbers(256))
+    assert (s["lamp"] == 1).all()
+    assert s["pdf"] == pytest.approx(1.0)
+
+
+def test_ten_thousand_identical_triangles_build_a_bounded_tree() -> None:
+    triangle = [[0, 0, 1], [1, 0, 1], [0, 1, 1]]
+    lights = mesh_light(triangle, [[0, 1, 2]] * 10_000)
+    assert lights.counts()["emitters"] == 10_000
+    assert lights.counts()["nodes"] < 2_000
+    truth = 10_000 * polygon_irradiance(triangle, (0.2, 0.2, 0.0), UP)
+    assert irradiance(lights, (0.2, 0.2, 0.0), UP) == pytest.approx(truth, rel=0.01)
