@@ -1,9 +1,8 @@
 // Triangles and rays as arrays: one mesh, no instances.
 #include <pybind11/numpy.h>
 
-#include <optional>
-#include <stdexcept>
-#include <string>
+#include <algorithm>
+#include <vector>
 
 #include "bindings/bind.h"
 #include "cpu/accel/accel.h"
@@ -21,63 +20,80 @@ constexpr size_t RAYS_PER_CHUNK = 4096;
 static_assert(sizeof(Ray) == 32);
 constexpr Affine IDENTITY = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
 
-class MeshAccel {
+// Meshes and instances as arrays, and rays through them. Shapes are checked in Python (luch/accel.py).
+class ArrayAccel {
  public:
-    MeshAccel(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags, bool brute_force,
-              unsigned threads)
+    // meshes: (M, 4) first vertex, vertices, first triangle, triangles. instance_meshes: (I,). to_world and
+    // to_object: (I, 12). visibility: (I,) RayKind bits. flags: one per triangle, or none.
+    ArrayAccel(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags,
+               const IndexArray& meshes, const IndexArray& instance_meshes, const FloatArray& to_world,
+               const FloatArray& to_object, const IndexArray& visibility, bool brute_force, unsigned threads)
         : pool_(threads) {
-        if (flags.size() != 0 && flags.size() != triangles.shape(0))
-            throw py::value_error("flags must be empty or one per triangle.");
-        MeshView mesh = {};
-        mesh.vertex_count = u32(positions.shape(0));
-        mesh.triangle_count = u32(triangles.shape(0));
-        InstanceView instance = {};
-        instance.to_world = instance.to_object = IDENTITY;
-        instance.visibility = RAY_ALL;
+        std::vector<MeshView> mesh_views(size_t(meshes.shape(0)), MeshView{});
+        std::vector<std::vector<u8>> mesh_flags;
+        for (size_t m = 0; m < mesh_views.size(); ++m) {
+            const u32* row = meshes.data() + 4 * m;
+            mesh_views[m].first_vertex = row[0];
+            mesh_views[m].vertex_count = row[1];
+            mesh_views[m].first_triangle = row[2];
+            mesh_views[m].triangle_count = row[3];
+            if (flags.size()) mesh_flags.emplace_back(flags.data() + row[2], flags.data() + row[2] + row[3]);
+        }
+        std::vector<InstanceView> instances(size_t(instance_meshes.shape(0)), InstanceView{});
+        for (size_t i = 0; i < instances.size(); ++i) {
+            instances[i].mesh = instance_meshes.data()[i];
+            instances[i].visibility = visibility.data()[i];
+            std::copy_n(to_world.data() + 12 * i, 12, instances[i].to_world.m);
+            std::copy_n(to_object.data() + 12 * i, 12, instances[i].to_object.m);
+        }
         SceneView scene = {};
         scene.positions = positions.data();
         scene.triangles = triangles.data();
-        scene.meshes = &mesh;
-        scene.instances = &instance;
-        scene.mesh_count = scene.instance_count = 1;
-        std::vector<std::vector<u8>> mesh_flags = {{flags.data(), flags.data() + flags.size()}};
+        scene.meshes = mesh_views.data();
+        scene.mesh_count = u32(mesh_views.size());
+        scene.instances = instances.data();
+        scene.instance_count = u32(instances.size());
         py::gil_scoped_release release;
         accel_ =
             Accel::build(scene, mesh_flags, pool_, brute_force ? cpu::AccelKind::BRUTE_FORCE : cpu::AccelKind::BVH);
     }
 
-    py::tuple closest(const FloatArray& rays) {
+    // kinds: one RayKind mask per ray, or none.
+    py::tuple closest(const FloatArray& rays, const IndexArray& kinds) {
         py::ssize_t count = rays.shape(0);
         FloatArray t(count), u(count), v(count);
-        py::array_t<i32> prim(count);
+        py::array_t<i32> prim(count), instance(count);
         float *t_out = t.mutable_data(), *u_out = u.mutable_data(), *v_out = v.mutable_data();
-        i32* prim_out = prim.mutable_data();
+        i32 *prim_out = prim.mutable_data(), *instance_out = instance.mutable_data();
         const Ray* in = reinterpret_cast<const Ray*>(rays.data());
+        const u32* kind = kinds.size() ? kinds.data() : nullptr;
         {
             py::gil_scoped_release release;
             pool_.parallel_for(size_t(count), RAYS_PER_CHUNK, [&](size_t begin, size_t end, unsigned) {
                 std::vector<Hit> hits(end - begin);
-                accel_->closest(in + begin, nullptr, hits.data(), end - begin);
+                accel_->closest(in + begin, kind ? kind + begin : nullptr, hits.data(), end - begin);
                 for (size_t i = begin; i < end; ++i) {
                     const Hit& hit = hits[i - begin];
                     t_out[i] = hit.t;
                     prim_out[i] = i32(hit.prim);  // NONE is -1
+                    instance_out[i] = i32(hit.instance);
                     u_out[i] = hit.u;
                     v_out[i] = hit.v;
                 }
             });
         }
-        return py::make_tuple(t, prim, u, v);
+        return py::make_tuple(t, prim, u, v, instance);
     }
 
-    py::array_t<u8> any(const FloatArray& rays) {
+    py::array_t<u8> any(const FloatArray& rays, const IndexArray& kinds) {
         py::ssize_t count = rays.shape(0);
         py::array_t<u8> blocked(count);
         u8* out = blocked.mutable_data();
         const Ray* in = reinterpret_cast<const Ray*>(rays.data());
+        const u32* kind = kinds.size() ? kinds.data() : nullptr;
         py::gil_scoped_release release;
         pool_.parallel_for(size_t(count), RAYS_PER_CHUNK, [&](size_t begin, size_t end, unsigned) {
-            accel_->any(in + begin, nullptr, out + begin, end - begin);
+            accel_->any(in + begin, kind ? kind + begin : nullptr, out + begin, end - begin);
         });
         return blocked;
     }
@@ -117,12 +133,12 @@ FloatArray spawn_rays(const FloatArray& corners, const FloatArray& uv, const Flo
 }  // namespace
 
 void bind_accel(py::module_& m) {
-    // Shapes and types are checked by luch/accel.py, which is the public face.
-    py::class_<MeshAccel>(m, "MeshAccel")
-        .def(py::init<const FloatArray&, const IndexArray&, const ByteArray&, bool, unsigned>())
-        .def("closest", &MeshAccel::closest)
-        .def("any", &MeshAccel::any)
-        .def("stats", &MeshAccel::stats);
+    py::class_<ArrayAccel>(m, "ArrayAccel")
+        .def(py::init<const FloatArray&, const IndexArray&, const ByteArray&, const IndexArray&, const IndexArray&,
+                      const FloatArray&, const FloatArray&, const IndexArray&, bool, unsigned>())
+        .def("closest", &ArrayAccel::closest)
+        .def("any", &ArrayAccel::any)
+        .def("stats", &ArrayAccel::stats);
     m.def("spawn_rays", &spawn_rays, "Rays off triangles by their error bound, for tests of the bound.");
 }
 

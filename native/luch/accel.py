@@ -16,6 +16,7 @@ from luch._native import core
 Float32s = npt.NDArray[np.float32]
 Int32s = npt.NDArray[np.int32]
 KINDS = ("BVH", "BRUTE_FORCE")
+_ALL_KINDS = np.zeros(0, np.uint32)  # no mask: every ray sees everything
 
 
 class Accel:
@@ -46,7 +47,11 @@ class Accel:
             flags = np.ascontiguousarray(may_be_transparent, dtype=bool).astype(np.uint8)
             if flags.shape != (len(corners),):
                 raise ValueError(f"may_be_transparent has shape {flags.shape}; it must be ({len(corners)},).")
-        self._core = core.MeshAccel(points, corners, flags, kind == "BRUTE_FORCE", threads)
+        mesh = np.array([[0, len(points), 0, len(corners)]], np.uint32)
+        here = np.eye(3, 4, dtype=np.float32).reshape(1, 12)
+        self._core = core.ArrayAccel(
+            points, corners, flags, mesh, np.zeros(1, np.uint32), here, here, np.full(1, 63, np.uint32),
+            kind == "BRUTE_FORCE", threads)  # fmt: skip
 
     def closest(self, rays: npt.ArrayLike) -> tuple[Float32s, Int32s, Float32s, Float32s]:
         """Closest hit of each ray. rays: (N, 8) float32.
@@ -54,12 +59,12 @@ class Accel:
         Returns t (inf on a miss), triangle index (-1 on a miss), and the barycentrics u, v:
         point = (1 - u - v) p0 + u p1 + v p2; each (N,). A ray that is not finite or has no direction misses.
         """
-        result: tuple[Float32s, Int32s, Float32s, Float32s] = self._core.closest(_rows(rays, 8, np.float32, "rays"))
-        return result
+        t, prim, u, v, _ = self._core.closest(_rows(rays, 8, np.float32, "rays"), _ALL_KINDS)
+        return t, prim, u, v
 
     def blocked(self, rays: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         """What lies in each ray's interval: 0 nothing, 1 an opaque triangle, 2 only ones that may be transparent."""
-        result: npt.NDArray[np.uint8] = self._core.any(_rows(rays, 8, np.float32, "rays"))
+        result: npt.NDArray[np.uint8] = self._core.any(_rows(rays, 8, np.float32, "rays"), _ALL_KINDS)
         return result
 
     def any(self, rays: npt.ArrayLike) -> npt.NDArray[np.bool_]:

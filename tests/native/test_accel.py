@@ -1,0 +1,245 @@
+"""The wide tree gives brute force's hits, bit for bit, and closed meshes let nothing through."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from luch.accel import Accel
+from support.accel_meshes import (
+    Mesh,
+    aimed_rays,
+    cube,
+    differences,
+    icosphere,
+    random_rays,
+    rows,
+    separate,
+    slivers,
+    soup,
+)
+
+RAYS = 3000
+HARD_MESHES: dict[str, Mesh] = {
+    "soup": soup(),
+    "small triangles": soup(1500, 0.02),
+    "slivers": slivers(1e-3),
+    "needles": slivers(1e-7),
+    "collinear": slivers(0.0),
+    "coplanar": (soup()[0] * np.float32([1, 1, 0]), soup()[1]),
+    "duplicates": tuple(np.tile(a, (5, 1)) for a in soup(120)),  # type: ignore[dict-item]
+    "identical": tuple(np.tile(a, (300, 1)) for a in soup(1, 1.0)),  # type: ignore[dict-item]
+    "points": separate(np.repeat(np.random.default_rng(1).normal(size=(200, 1, 3)), 3, axis=1)),
+    "sphere": icosphere(3),
+    "squashed sphere": (icosphere(3)[0] * np.float32([1, 1, 1e-6]), icosphere(3)[1]),
+    "grid cube": cube(8, 3),
+    "one triangle": soup(1, 1.0),
+    "five triangles": soup(5, 1.0),
+    "size 2^-i": separate(2.0 ** -np.arange(120)[:, None, None] * np.random.default_rng(2).normal(size=(120, 3, 3))),
+}
+
+
+@pytest.mark.parametrize("name", HARD_MESHES)
+def test_tree_hits_are_bit_equal_to_brute_force(name: str) -> None:
+    mesh = HARD_MESHES[name]
+    rays = np.concatenate([random_rays(RAYS), aimed_rays(mesh, RAYS)])
+    differ, hit = differences(mesh, rays)
+    assert differ == 0
+    assert hit > 0 or name in ("collinear", "points"), "these rays prove nothing"
+
+
+@pytest.mark.parametrize("scale", [1e-18, 1e-9, 1e-3, 1e6, 1e18])
+def test_tree_hits_are_bit_equal_to_brute_force_at_any_scale(scale: float) -> None:
+    points, triangles = soup()
+    mesh = ((points * scale).astype(np.float32), triangles)
+    differ, hit = differences(mesh, np.concatenate([random_rays(RAYS, scale=scale), aimed_rays(mesh, RAYS)]))
+    assert differ == 0
+    assert hit > RAYS
+
+
+@pytest.mark.parametrize("distance", [1e3, 1e5, 1e7])
+def test_tree_hits_are_bit_equal_to_brute_force_far_from_the_origin(distance: float) -> None:
+    points, triangles = soup()
+    mesh = ((points * 10 + np.float32([1, 0.7, -1.3]) * distance).astype(np.float32), triangles)
+    differ, hit = differences(mesh, aimed_rays(mesh, 2 * RAYS))
+    assert differ == 0
+    assert hit > RAYS
+
+
+def test_interval_is_open_below_and_closed_above() -> None:
+    wall = separate(np.array([[(-9, -9, 2), (9, -9, 2), (0, 9, 2)]]))
+    rays = np.concatenate([rows(np.zeros((1, 3)), np.array([[0, 0, 1.0]]), lo, hi)
+                           for lo, hi in ((0, 2), (2, 9), (0, np.nextafter(np.float32(2), np.float32(0))),
+                                          (np.nextafter(np.float32(2), np.float32(0)), 9), (-5, 9))])  # fmt: skip
+    for kind in ("BVH", "BRUTE_FORCE"):
+        assert list(Accel(*wall, kind=kind).any(rays)) == [True, False, False, True, True]  # type: ignore[arg-type]
+
+
+def test_of_equal_hits_the_smaller_index_wins() -> None:
+    points, triangles = soup(1, 1.0)
+    mesh = (points, np.tile(triangles, (777, 1)))
+    _, prim, _, _ = Accel(*mesh).closest(aimed_rays(mesh, RAYS))
+    assert set(prim) == {-1, 0}
+
+
+def leaks(mesh: Mesh, count: int, seed: int) -> int:
+    """Rays from near the middle of a closed mesh, at its vertices, edges and faces, that hit nothing."""
+    rng = np.random.default_rng(seed)
+    rays = aimed_rays(mesh, count, seed)
+    target = rays[:, :3] + rays[:, 4:7]
+    middle = mesh[0].mean(0, dtype=np.float64)
+    size = np.abs(mesh[0] - middle).max()
+    origin = (middle + 0.3 * size * rng.uniform(-1, 1, (count, 3))).astype(np.float32)
+    axis = np.arange(3) == rng.integers(3, size=(count, 1))
+    aligned = rng.random((count, 1)) < 0.25
+    origin = np.where(aligned & ~axis, np.clip(target, origin.min(0), origin.max(0)), origin)
+    direction = np.where(aligned, np.where(axis, target - origin, rng.choice([0.0, -0.0], (count, 3))), target - origin)
+    rays = rows(origin, direction)
+    _, prim, _, _ = Accel(*mesh, threads=1).closest(rays)
+    return int((prim[np.abs(rays[:, 4:7]).max(1) > 0] < 0).sum())
+
+
+CLOSED = {"icosphere": icosphere(4), "grid cube": cube(32, 6), "cube": cube(1, 1)}
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_closed_mesh_lets_no_ray_through_vertices_edges_or_along_axes(name: str) -> None:
+    assert leaks(CLOSED[name], 100_000, seed=11) == 0
+
+
+@pytest.mark.parametrize(("scale", "offset"), [(1e-18, 0.0), (1e-6, 0.0), (100.0, 1e5), (100.0, 1e7), (1e18, 0.0)])
+def test_closed_mesh_lets_no_ray_through_at_any_scale_and_place(scale: float, offset: float) -> None:
+    points, triangles = icosphere(4)
+    moved = (points * np.float64(scale) + np.array([1, 0.7, -1.3]) * offset).astype(np.float32)
+    assert leaks((moved, triangles), 50_000, seed=12) == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", CLOSED)
+def test_closed_mesh_lets_none_of_many_rays_through(name: str) -> None:
+    assert sum(leaks(CLOSED[name], 1_000_000, seed) for seed in range(33)) == 0
+
+
+def test_rays_that_are_not_rays_miss() -> None:
+    mesh = icosphere(2)
+    bad: list[list[float]] = []
+    for value in (np.nan, np.inf, -np.inf):
+        for field in (0, 1, 2, 4, 5, 6):
+            ray = [0, 0, 0, 0, 0.1, 0.2, 0.3, np.inf]
+            ray[field] = value
+            bad.append(ray)
+    bad += [[0, 0, 0, 0, 0, 0, 0, np.inf], [0, 0, 0, np.nan, 0, 0, 1, 9], [0, 0, 0, 0, 0, 0, 1, np.nan],
+            [0, 0, 0, 5, 0, 0, 1, 2], [0, 0, 0, 0, 0, 0, 1, -1], [0, 0, 0, 0, 1e-45, 0, 0, 9]]  # fmt: skip
+    rays = np.array(bad, np.float32)
+    for kind in ("BVH", "BRUTE_FORCE"):
+        accel = Accel(*mesh, kind=kind)  # type: ignore[arg-type]
+        t, prim, _, _ = accel.closest(rays)
+        assert (prim == -1).all()
+        assert (t == np.inf).all()
+        assert not accel.any(rays).any()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 3e38])
+def test_triangles_of_a_broken_vertex_are_dropped_counted_and_harm_nothing_else(value: float) -> None:
+    points, triangles = icosphere(2)
+    points = points.copy()
+    points[7] = value
+    mesh = (points, triangles)
+    broken = int((triangles == 7).any(1).sum())
+    assert Accel(*mesh).stats["dropped_triangles"] == broken
+    assert Accel(*mesh).stats["triangles"] == len(triangles) - broken
+    differ, hit = differences(mesh, random_rays(RAYS))
+    assert differ == 0
+    assert hit > 0
+
+
+def test_index_outside_the_mesh_drops_its_triangle() -> None:
+    points, triangles = soup(10)
+    triangles[3, 1] = 4_000_000_000
+    assert Accel(points, triangles).stats["dropped_triangles"] == 1
+
+
+def test_empty_mesh_is_missed() -> None:
+    for points in (np.zeros((0, 3), np.float32), np.full((3, 3), np.nan, np.float32)):
+        triangles = np.arange(len(points), dtype=np.uint32).reshape(-1, 3)
+        accel = Accel(points, triangles)
+        assert (accel.closest(random_rays(10))[1] == -1).all()
+        assert not accel.any(random_rays(10)).any()
+
+
+def test_tracing_no_rays_returns_empty_arrays() -> None:
+    t, prim, _, _ = Accel(*soup(5)).closest(np.zeros((0, 8), np.float32))
+    assert len(t) == len(prim) == 0
+
+
+@pytest.mark.parametrize("threads", [2, 5])
+def test_threads_change_no_bit_of_tree_or_hits(threads: int) -> None:
+    points, triangles = icosphere(6)  # 81,920: several chunks and tasks
+    one, many = Accel(points, triangles, threads=1), Accel(points, triangles, threads=threads)
+    for key in ("nodes", "leaf_blocks", "bytes"):
+        assert one.stats[key] == many.stats[key]
+    for a, b in zip(one.closest(random_rays(20_000)), many.closest(random_rays(20_000)), strict=True):
+        assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
+
+
+def test_tree_of_a_large_mesh_is_small_and_bit_equal_on_samples() -> None:
+    points, triangles = icosphere(6)
+    rng = np.random.default_rng(5)
+    points = points * (1 + 0.02 * rng.normal(size=(len(points), 1))).astype(np.float32)
+    assert Accel(points, triangles).stats["bytes"] <= 66 * len(triangles)
+    differ, hit = differences((points, triangles), aimed_rays((points, triangles), 300))
+    assert differ == 0
+    assert hit > 200
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        np.repeat(np.random.default_rng(1).normal(size=(1, 3, 3)), 100_000, axis=0),
+        np.random.default_rng(1).normal(size=(100_000, 3, 3)) * [1, 1, 0],
+        0.9999 ** np.arange(100_000)[:, None, None] * np.random.default_rng(1).normal(size=(1, 3, 3)),
+        2.0 ** -(np.arange(100_000) % 120)[:, None, None] * np.random.default_rng(1).normal(size=(1, 3, 3)),
+    ],
+    ids=["identical", "in one plane", "shrinking slowly", "shrinking fast"],
+)
+def test_builder_finishes_with_a_small_tree_on(corners: np.ndarray) -> None:
+    accel = Accel(*separate(corners))
+    assert accel.stats["triangles"] == len(corners)
+    assert accel.stats["bytes"] <= 120 * len(corners)
+    assert accel.closest(random_rays(10))[0].shape == (10,)
+
+
+def test_blocked_tells_opaque_from_maybe_transparent() -> None:
+    def wall(z: float) -> list[list[float]]:
+        return [[-9, -9, z], [9, -9, z], [0, 9, z]]
+
+    points, triangles = separate(np.array([wall(1), wall(2), wall(3)]))
+    flags = [True, False, True]
+    rays = np.concatenate([rows(np.zeros((1, 3)), np.array([[0, 0, 1.0]]), lo, hi)
+                           for lo, hi in ((0, 0.5), (0, 1.5), (0, 2.5), (2.5, 9), (3.5, 9))])  # fmt: skip
+    for kind in ("BVH", "BRUTE_FORCE"):
+        accel = Accel(points, triangles, kind=kind, may_be_transparent=flags)  # type: ignore[arg-type]
+        assert list(accel.blocked(rays)) == [0, 2, 1, 2, 0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"positions": np.zeros((3, 2), np.float32)}, r"positions has shape \(3, 2\)"),
+        ({"positions": np.array([["a", "b", "c"]])}, "positions holds"),
+        ({"triangles": np.zeros((1, 4), np.uint32)}, r"triangles has shape \(1, 4\)"),
+        ({"triangles": np.zeros((1, 3), np.float32)}, "triangles holds float32"),
+        ({"triangles": np.array([[0, 1, -1]])}, "index outside"),
+        ({"kind": "KD_TREE"}, "kind is 'KD_TREE'"),
+        ({"threads": -1}, "threads is -1"),
+        ({"may_be_transparent": [True, False]}, r"may_be_transparent has shape \(2,\)"),
+    ],
+)
+def test_bad_input_raises_one_clear_error(change: dict[str, object], message: str) -> None:
+    good: dict[str, object] = {"positions": np.zeros((3, 3), np.float32), "triangles": np.array([[0, 1, 2]])}
+    with pytest.raises(ValueError, match=message):
+        Accel(**(good | change))  # type: ignore[arg-type]
+
+
+def test_bad_rays_raise_one_clear_error() -> None:
+    with pytest.raises(ValueError, match=r"rays has shape \(4, 6\)"):
+        Accel(*soup(1)).closest(np.zeros((4, 6), np.float32))
