@@ -215,6 +215,8 @@ class ProgramBuilder:
                 if known is None:
                     return None
                 total += known
+            elif _emits(node):  # attenuated by its coat
+                return None
         return float(total[0]), float(total[1]), float(total[2])
 
     def emission_bound(self) -> tuple[float, float, float]:
@@ -223,6 +225,9 @@ class ProgramBuilder:
         for node in self._closures:
             if node.op.name == "CLOSURE_EMISSION":
                 total += [self._guess(value) for value in node.inputs[:3]]
+            elif _emits(node):  # inputs: weight, ..., emission colour and strength, film
+                glow = zip(node.inputs[:3], node.inputs[-6:-3], strict=True)
+                total += [self._guess(weight) * self._guess(color) for weight, color in glow]
         return float(total[0]), float(total[1]), float(total[2])
 
     def finish(self) -> Program:
@@ -282,7 +287,7 @@ class ProgramBuilder:
         """Every operation that a closure needs, once, before its first use; light's closures first."""
         order: list[_Node] = []
         done: set[int] = set()
-        roots = sorted(self._closures, key=lambda node: node.op.name not in _LIGHT_CLOSURES)
+        roots = sorted(self._closures, key=lambda node: not (node.op.name in _LIGHT_CLOSURES or _emits(node)))
         for root in roots:
             stack: list[tuple[_Node, bool]] = [(root, False)]
             while stack:
@@ -337,6 +342,8 @@ class ProgramBuilder:
                 flags |= HOLDOUT
             elif name.startswith("CLOSURE_"):
                 flags |= SURFACE
+                if name == "CLOSURE_PRINCIPLED":  # params: bump correction, multiscatter, emits, lets through
+                    flags |= (EMISSION if node.params[2] else 0) | (TRANSPARENT if node.params[3] else 0)
             elif name.startswith("LIGHT_PATH"):
                 flags |= LIGHT_PATH
         if flags & EMISSION:
@@ -354,6 +361,8 @@ class ProgramBuilder:
         known = dict(self._constant_of)
         tables = np.concatenate(self._tables) if self._tables else np.zeros(0, np.float32)
         for node in schedule:
+            if _emits(node):
+                return False
             if node.op.name == "CLOSURE_EMISSION" and any(known.get(value) != 0.0 for value in node.inputs[:3]):
                 return False
             if node.op.closure:
@@ -372,6 +381,11 @@ class ProgramBuilder:
                 for k in range(node.op.outputs):
                     known[node.first + k] = float(run["registers"][n + k, 0])
         return True
+
+
+def _emits(node: _Node) -> bool:
+    """Whether a Principled closure carries its emission itself (see OpClosurePrincipled)."""
+    return node.op.name == "CLOSURE_PRINCIPLED" and bool(node.params[2])
 
 
 def _slot[T](slots: list[T], item: T) -> int:

@@ -40,6 +40,7 @@ def compile_material(material: bpy.types.Material | None, context: Context) -> s
     inlined = bpy.types.InlineShaderNodes.from_material(material)
     compiler = Compiler(inlined.node_tree, owner, context)
     compiler.pass_index = float(material.pass_index)
+    compiler.bump_correction = bool(getattr(material, "use_bump_map_correction", True))
     with _deep_trees():
         _emit_displacement(compiler, material)
     _emit_surface(compiler)
@@ -58,6 +59,8 @@ def compile_material(material: bpy.types.Material | None, context: Context) -> s
 def default_material(name: str = "Default") -> scene.Material:
     """What Blender shows where a slot is empty: grey diffuse of 0.8."""
     builder = ProgramBuilder()
+    inputs = [*builder.vector(0.8, 0.8, 0.8), builder.constant(0.0), *builder.vector(0.0, 0.0, 0.0)]
+    builder.closure("CLOSURE_DIFFUSE", builder.vector(1.0, 1.0, 1.0), inputs, (1,))
     return scene.Material(name=name, surface=builder.finish())
 
 
@@ -91,6 +94,21 @@ def _emit_surface(compiler: Compiler) -> None:
     one = compiler.builder.vector(1.0, 1.0, 1.0)
     with _deep_trees():
         compiler.closure(output, "Surface", one)
+        _emit_aovs(compiler)
+
+
+def _emit_aovs(compiler: Compiler) -> None:
+    """AOV Output nodes: what the view layer asks for by that name."""
+    kinds = {aov.name: aov.type for aov in compiler.context.view_layer.aovs}
+    b = compiler.builder
+    for node in compiler.tree.nodes:
+        if node.bl_idname != "ShaderNodeOutputAOV" or node.aov_name not in kinds:
+            continue
+        if kinds[node.aov_name] == "COLOR":
+            stored = (*compiler.color(node, "Color"), b.constant(1.0))
+        else:
+            stored = (compiler.float(node, "Value"),) * 4
+        b.closure("STORE_AOV", None, stored, (b.aov(node.aov_name),))
 
 
 def _emit_displacement(compiler: Compiler, material: bpy.types.Material) -> None:

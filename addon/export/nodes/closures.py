@@ -1,11 +1,32 @@
-"""Closure nodes: what a surface does with light. Each is given the weight it carries in the tree."""
+"""Closure nodes: what a surface does with light. Each is given the weight it carries in the tree.
+
+An unlinked Normal is passed as the zero vector (the shading normal, or the bump that stands for the
+material's displacement); an unlinked Tangent matters only to anisotropic lobes.
+"""
 
 from __future__ import annotations
 
 import bpy
-from luch.shader import Vector
+from luch.shader import Value, Vector
 
 from .tree import Compiler, closure_emitter
+
+_MICROFACETS = {"GGX": 0, "BECKMANN": 1, "MULTI_GGX": 2, "ASHIKHMIN_SHIRLEY": 3}  # Microfacets of bsdf/params.h
+
+
+def _normal(c: Compiler, node: bpy.types.Node, identifier: str = "Normal") -> Vector:
+    return c.vector_or(node, identifier, lambda: c.surface_normal or c.builder.vector(0.0, 0.0, 0.0))
+
+
+def _tangent(c: Compiler, node: bpy.types.Node, anisotropy: Value) -> Vector:
+    """The tangent, radial about Z where none is linked; zero where nothing is anisotropic."""
+    if c.builder.known(anisotropy) == 0.0:
+        return c.builder.vector(0.0, 0.0, 0.0)
+    return c.vector_or(node, "Tangent", lambda: c.builder.op3("TANGENT_RADIAL", (), (0, 0, 2)))
+
+
+def _params(c: Compiler, *words: int) -> tuple[int, ...]:
+    return (int(c.bump_correction), *words)
 
 
 @closure_emitter("ShaderNodeEmission", "ShaderNodeBackground")
@@ -42,3 +63,136 @@ def add_shader(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Add Shader: both, in full."""
     c.closure(node, "Shader", weight)
     c.closure(node, "Shader_001", weight)
+
+
+@closure_emitter("ShaderNodeBsdfDiffuse")
+def diffuse(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Diffuse: Lambert, Oren-Nayar where it is rough."""
+    inputs = (*c.color(node, "Color"), c.float(node, "Roughness"), *_normal(c, node))
+    c.builder.closure("CLOSURE_DIFFUSE", weight, inputs, _params(c))
+
+
+@closure_emitter("ShaderNodeBsdfTranslucent")
+def translucent(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Translucent: diffuse to the other side."""
+    c.builder.closure("CLOSURE_TRANSLUCENT", weight, (*c.color(node, "Color"), *_normal(c, node)), _params(c))
+
+
+@closure_emitter("ShaderNodeBsdfSheen")
+def sheen(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Sheen: microfibre, or Ashikhmin's velvet."""
+    inputs = (*c.color(node, "Color"), c.float(node, "Roughness"), *_normal(c, node))
+    c.builder.closure("CLOSURE_SHEEN", weight, inputs, _params(c, int(node.distribution == "ASHIKHMIN")))
+
+
+@closure_emitter("ShaderNodeBsdfAnisotropic")
+def glossy(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Glossy."""
+    anisotropy = c.float(node, "Anisotropy")
+    scalars = (c.float(node, "Roughness"), anisotropy, c.float(node, "Rotation"))
+    inputs = (*c.color(node, "Color"), *scalars, *_normal(c, node), *_tangent(c, node, anisotropy))
+    c.builder.closure("CLOSURE_GLOSSY", weight, inputs, _params(c, _MICROFACETS[node.distribution]))
+
+
+@closure_emitter("ShaderNodeBsdfMetallic")
+def metallic(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Metallic: F82 tint or a physical conductor."""
+    anisotropy = c.float(node, "Anisotropy")
+    colors = [value for name in ("Base Color", "Edge Tint", "IOR", "Extinction") for value in c.vector(node, name)]
+    scalars = (c.float(node, "Roughness"), anisotropy, c.float(node, "Rotation"))
+    film = (c.float(node, "Thin Film Thickness"), c.float(node, "Thin Film IOR"))
+    inputs = (*colors, *scalars, *_normal(c, node), *_tangent(c, node, anisotropy), *film)
+    physical = int(node.fresnel_type == "PHYSICAL_CONDUCTOR")
+    c.builder.closure("CLOSURE_METALLIC", weight, inputs, _params(c, _MICROFACETS[node.distribution], physical))
+
+
+@closure_emitter("ShaderNodeBsdfGlass")
+def glass(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Glass."""
+    film = (c.float(node, "Thin Film Thickness"), c.float(node, "Thin Film IOR"))
+    scalars = (c.float(node, "Roughness"), c.float(node, "IOR"))
+    inputs = (*c.color(node, "Color"), *scalars, *_normal(c, node), *film)
+    c.builder.closure("CLOSURE_GLASS", weight, inputs, _params(c, _MICROFACETS[node.distribution]))
+
+
+@closure_emitter("ShaderNodeBsdfRefraction")
+def refraction(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Refraction."""
+    inputs = (*c.color(node, "Color"), c.float(node, "Roughness"), c.float(node, "IOR"), *_normal(c, node))
+    c.builder.closure("CLOSURE_REFRACTION", weight, inputs, _params(c, _MICROFACETS[node.distribution]))
+
+
+@closure_emitter("ShaderNodeBsdfPrincipled")
+def principled(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Principled. Alpha, and emission under neither coat nor sheen, become closures of their own."""
+    b = c.builder
+    alpha = b.op1("MATH_SATURATE", (c.float(node, "Alpha"),))
+    b.closure("CLOSURE_TRANSPARENT", b.scale(weight, b.op1("MATH_SUBTRACT", (b.constant(1.0), alpha))))
+    weight = b.scale(weight, alpha)
+    strength = c.float(node, "Emission Strength")
+    glow = b.scale(c.color(node, "Emission Color"), strength)
+    layered = any(b.known(c.float(node, name)) != 0.0 for name in ("Coat Weight", "Sheen Weight"))
+    if not layered:
+        b.closure("CLOSURE_EMISSION", b.modulate(weight, glow))
+        glow = b.vector(0.0, 0.0, 0.0)
+    emits = any(b.known(value) != 0.0 for value in glow)
+    thin_wall, transmission = c.float(node, "Thin Wall"), c.float(node, "Transmission Weight")
+    lets_through = b.known(thin_wall) != 0.0 and b.known(transmission) != 0.0
+    if b.known(thin_wall) in (None, 0.0) and b.known(c.float(node, "Subsurface Weight")) != 0.0:
+        c.warn(node, "scatters under the surface, which is not supported yet; it is shown as diffuse")
+    params = _params(c, int(node.distribution == "MULTI_GGX"), int(emits), int(lets_through))
+    b.closure("CLOSURE_PRINCIPLED", weight, _principled_inputs(c, node, thin_wall, glow), params)
+
+
+def _principled_inputs(c: Compiler, node: bpy.types.Node, thin_wall: Value, glow: Vector) -> list[Value]:
+    """The node's inputs in the order that OpClosurePrincipled reads them."""
+    anisotropic = c.float(node, "Anisotropic")
+    has_coat = c.builder.known(c.float(node, "Coat Weight")) != 0.0
+    zero = c.builder.vector(0.0, 0.0, 0.0)
+    coat_normal = _normal(c, node, "Coat Normal") if has_coat or c.is_linked(node, "Coat Normal") else zero
+
+    def scalars(*names: str) -> list[Value]:
+        return [c.float(node, name) for name in names]
+
+    return [
+        *c.color(node, "Base Color"),
+        *scalars("Metallic", "Roughness", "IOR"),
+        thin_wall,
+        *_normal(c, node),
+        *scalars("Diffuse Roughness", "Subsurface Weight", "Subsurface Anisotropy", "Specular IOR Level"),
+        *c.color(node, "Specular Tint"),
+        anisotropic,
+        *scalars("Anisotropic Rotation"),
+        *_tangent(c, node, anisotropic),
+        *scalars("Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR"),
+        *c.color(node, "Coat Tint"),
+        *coat_normal,
+        *scalars("Sheen Weight", "Sheen Roughness"),
+        *c.color(node, "Sheen Tint"),
+        *glow,
+        c.builder.constant(1.0),  # strength is in the colour
+        *scalars("Thin Film Thickness", "Thin Film IOR"),
+    ]
+
+
+@closure_emitter("ShaderNodeSubsurfaceScattering")
+def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Subsurface Scattering: diffuse of the same colour."""
+    c.warn(node, "is not supported yet; it is shown as diffuse of its colour")
+    inputs = (*c.color(node, "Color"), c.builder.constant(0.0), *_normal(c, node))
+    c.builder.closure("CLOSURE_DIFFUSE", weight, inputs, _params(c))
+
+
+@closure_emitter("ShaderNodeBsdfToon", "ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled")
+def as_diffuse(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Toon and hair: diffuse of the same colour."""
+    c.warn(node, "is not supported yet; it is shown as diffuse of its colour")
+    zero = c.builder.constant(0.0)
+    c.builder.closure("CLOSURE_DIFFUSE", weight, (*c.color(node, "Color"), zero, zero, zero, zero), _params(c))
+
+
+@closure_emitter("ShaderNodeBsdfRayPortal")
+def ray_portal(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Ray Portal: light passes straight on."""
+    c.warn(node, "is not supported yet; light passes straight through")
+    c.builder.closure("CLOSURE_TRANSPARENT", c.builder.modulate(weight, c.color(node, "Color")))

@@ -91,6 +91,7 @@ class Compiler:
         self.context = context
         self.builder = ProgramBuilder()
         self.pass_index = 0.0  # Object Info > Material Index
+        self.bump_correction = True  # lifts bumped normals so that reflections leave the surface
         self.surface_normal: Vector | None = None  # where displacement is shown as bump
         self._links = {(link.to_node.name, link.to_socket.identifier): link for link in tree.links if link.is_valid}
         self._used = {(link.from_node.name, link.from_socket.identifier) for link in self._links.values()}

@@ -84,18 +84,27 @@ int op_count() { return int(OpCode::COUNT); }
 
 const OpInfo& op_info(int op) { return INFO[op]; }
 
+bool feeds_light(int op, const u32* params) {
+    switch (OpCode(op)) {
+        case OpCode::CLOSURE_EMISSION:
+        case OpCode::CLOSURE_TRANSPARENT:
+        case OpCode::CLOSURE_HOLDOUT:
+            return true;
+        case OpCode::CLOSURE_PRINCIPLED:
+            return params[2] != 0 || params[3] != 0;
+        default:
+            return false;
+    }
+}
+
 void run_program(const SceneView& scene, const Program& program, const ShadePoints& points, ClosureSet* closures,
-                 float* registers, float* aovs, size_t aov_stride) {
+                 float* registers, float* aovs, size_t aov_stride, Wanted wanted) {
     const Run run{&scene, &program, &points, closures, registers, aovs, aov_stride};
     load_constants(run, program);
-    for (int lane = 0; lane < points.count; lane++) {
-        ClosureSet& set = closures[lane];
-        set.count = 0;
-        set.emission = set.transparent = make_vec3(0.0f);
-        set.holdout = 0.0f;
-    }
+    for (int lane = 0; lane < points.count; lane++) clear_closures(closures[lane]);
     const Instruction* instruction = scene.instructions + program.first_instruction;
-    for (u32 k = 0; k < program.instruction_count; k++, instruction++) {
+    const u32 count = wanted == Wanted::LIGHT ? program.light_instruction_count : program.instruction_count;
+    for (u32 k = 0; k < count; k++, instruction++) {
         RUN[instruction->op](run, scene.operands + instruction->operands);
     }
 }

@@ -16,15 +16,21 @@ struct OpInfo {
 
 int op_count();
 const OpInfo& op_info(int op);
+// Whether the operation adds to emission, transparency or holdout.
+bool feeds_light(int op, const u32* params);
+
+// LIGHT: emission, transparency and holdout alone (shadow rays, light sampling): no lobes.
+enum class Wanted { ALL, LIGHT };
 
 // Floats that a program's registers need.
 inline size_t register_floats(const Program& program) { return size_t(program.register_count) * SHADE_LANES; }
 
 // Runs the program for points[0, points.count). closures[points.count] are started empty and filled.
 // registers: scratch of register_floats(program) floats, 64-byte aligned. aovs: null, or
-// points.count rows of aov_stride floats that AOV Output nodes write to.
+// points.count rows of aov_stride floats that AOV Output nodes write to. With Wanted::LIGHT the points'
+// flags must say PATH_EMISSION_ONLY or PATH_TRANSPARENT_ONLY too.
 void run_program(const SceneView& scene, const Program& program, const ShadePoints& points, ClosureSet* closures,
-                 float* registers, float* aovs = nullptr, size_t aov_stride = 0);
+                 float* registers, float* aovs = nullptr, size_t aov_stride = 0, Wanted wanted = Wanted::ALL);
 
 // Computes values only: closure operations are passed over; results stay in their registers.
 void run_values(const SceneView& scene, const Program& program, const ShadePoints& points, float* registers);

@@ -46,8 +46,11 @@ Program LinkedPrograms::add(const ProgramSource& source) {
             }
             operands.push_back(word);
         }
-        at += registers + param_count;
         program.instruction_count++;
+        if (feeds_light(int(op), source.code.data() + at + registers)) {
+            program.light_instruction_count = program.instruction_count;
+        }
+        at += registers + param_count;
     }
     append(constants, source.constants);
     append(tables, source.tables);

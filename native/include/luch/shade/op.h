@@ -37,6 +37,7 @@ struct Instruction {
 
 struct Program {
     u32 first_instruction, instruction_count;  // into SceneView::instructions
+    u32 light_instruction_count;               // the first so many give emission, transparency, holdout
     u32 register_count;
     u32 first_constant, constant_count;        // SceneView::constants: registers [0, constant_count) hold them
     // A program's own slots (params) are relative to these; see table_of, image_of, attribute_of, aov_of.

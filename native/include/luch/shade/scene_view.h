@@ -67,6 +67,8 @@ struct ImageView {
 struct LightsView;  // light/light.h
 struct CameraView;  // camera/camera.h
 
+enum SceneFlag : u32 { SCENE_NO_REFLECTIVE_CAUSTICS = 1u, SCENE_NO_REFRACTIVE_CAUSTICS = 2u };
+
 struct SceneView {
     const float* positions;      // 3 per vertex, object space
     const u32* triangles;        // 3 per triangle, local vertex indices
@@ -91,6 +93,7 @@ struct SceneView {
     u32 mesh_count, instance_count, object_count, material_count, image_count, light_count;
     u32 uv_attribute, color_attribute, generated_attribute, tangent_attribute;  // ids of the defaults
     Program world_program;
+    u32 flags;                   // SceneFlag
     Affine world_to_camera;      // Texture Coordinate > Camera/Window, Camera Data
     Vec3 camera_position;
     const CameraView* camera;    // Texture Coordinate > Camera/Window, Camera Data; null: they give 0
