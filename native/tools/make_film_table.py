@@ -2,8 +2,8 @@
 
 Run by hand: python native/tools/make_film_table.py
 
-A wave whose path is longer by d has the phase 2 pi d / wavelength. A channel integrates it over the
-wavelengths it is sensitive to: S(d) = sum_w rgb(w) exp(i 2 pi d / w) / sum_w rgb(w), so that S(0) = 1.
+A wave whose path is longer by d lags by 2 pi d / wavelength. A channel integrates it over the
+wavelengths it is sensitive to: S(d) = sum_w rgb(w) exp(-i 2 pi d / w) / sum_w rgb(w), so that S(0) = 1.
 rgb(w) are the CIE 1931 colour matching functions (2 degrees) in linear Rec.709 with its white point;
 they are read, in steps of 5 nm, from the copy that the `bpy` package carries.
 """
@@ -37,7 +37,7 @@ def main() -> None:
     fine = np.linspace(380.0, 780.0, 4001)
     rgb = np.stack([np.interp(fine, nm, rgb[:, i]) for i in range(3)], axis=1)
     path = np.linspace(0.0, LONGEST_NM, SIZE)
-    wave = np.exp(2j * np.pi * path[:, None] / fine[None, :])
+    wave = np.exp(-2j * np.pi * path[:, None] / fine[None, :])
     seen = wave @ rgb / rgb.sum(axis=0)
     words = [f"{v:.6g}" for i in range(3) for part in (seen[:, i].real, seen[:, i].imag) for v in part]
     words = [(w if any(c in w for c in ".e") else w + ".0") + "f" for w in words]
