@@ -40,16 +40,16 @@ class LuchRenderEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, describe_error(error))
 
     def _render(self, depsgraph: Any) -> None:
-        from luch.render import render
+        from luch import render
 
-        from .export import export_scene
+        from . import export
 
         reporter = Reporter(self, depsgraph.scene)
         reporter.say("Exporting scene")
-        scene = export_scene(depsgraph, self, cache=self._mesh_cache(depsgraph))
+        scene = export.export_scene(depsgraph, self, cache=self._mesh_cache(depsgraph))
         reporter.warn(scene.warnings)
         with ResultWriter(self, depsgraph.view_layer.name, scene.film) as writer:
-            result = render(scene, progress=lambda progress: reporter.progress(progress, writer))
+            result = render.render(scene, progress=lambda progress: reporter.progress(progress, writer))
             writer.write(result.passes)
         stats = reporter.statistics(scene, result.stats)
         last_stats[depsgraph.scene.name] = stats

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -43,12 +44,16 @@ class Reporter:
     def progress(self, progress: Any, writer: ResultWriter) -> bool:
         """Called by the renderer between batches. False: the user wants it to end."""
         self._peak_memory_mib = max(self._peak_memory_mib, progress.memory_bytes / MIB)
-        self._engine.update_progress(progress.samples / max(1, progress.total_samples))
+        self._engine.update_progress(progress.fraction)
         self._engine.update_memory_stats(memory_used=progress.memory_bytes / MIB, memory_peak=self._peak_memory_mib)
         self._engine.update_stats("", progress_line(progress))
         self._show_picture(progress, writer)
-        self.cancelled = self._engine.test_break()
+        self.cancelled = self.user_wants_to_stop()
         return not self.cancelled
+
+    def user_wants_to_stop(self) -> bool:
+        """Escape was pressed, or the window closed."""
+        return bool(self._engine.test_break())
 
     def statistics(self, scene: Scene, stats: dict[str, Any]) -> dict[str, Any]:
         """Everything known about the render, fit for JSON."""
@@ -67,7 +72,7 @@ class Reporter:
     def _show_picture(self, progress: Any, writer: ResultWriter) -> None:
         """The film so far, ever less often: converting it costs, and late changes are small."""
         now = time.monotonic()
-        if bpy.app.background or now < self._next_picture:
+        if bpy.app.background or not progress.new_picture or now < self._next_picture:
             return
         writer.show(progress.passes())
         self._interval_s = min(self._interval_s * PICTURE_INTERVAL_GROWTH, LONGEST_PICTURE_INTERVAL_S)
@@ -77,7 +82,7 @@ class Reporter:
 def progress_line(progress: Any) -> str:
     """For the status line: "Sample 32/128 | Remaining 00:14 | 312 MiB"."""
     parts = [f"Sample {progress.samples}/{progress.total_samples}"]
-    if progress.remaining_seconds is not None and progress.remaining_seconds >= 0.0:
+    if math.isfinite(progress.remaining_seconds):
         parts.append(f"Remaining {clock(progress.remaining_seconds)}")
     parts.append(f"{progress.memory_bytes / MIB:.0f} MiB")
     return " | ".join(parts)
@@ -85,7 +90,7 @@ def progress_line(progress: Any) -> str:
 
 def clock(seconds: float) -> str:
     """Seconds as Blender writes them: mm:ss, or h:mm:ss."""
-    whole = round(min(seconds, 359_999.0))  # infinite and silly estimates end here
+    whole = round(min(seconds, 359_999.0))  # silly estimates end here
     hours, rest = divmod(whole, 3600)
     minutes, left = divmod(rest, 60)
     return f"{hours}:{minutes:02d}:{left:02d}" if hours else f"{minutes:02d}:{left:02d}"

@@ -41,7 +41,7 @@ class ResultWriter:
         for target in self._result.layers[0].passes:
             source = passes.get(target.name)
             if source is not None:
-                target.rect.foreach_set(_fit(source, len(target.rect), target))
+                target.rect.foreach_set(_fit(source, len(target.rect) * target.channels, target.name))
 
     def show(self, passes: Mapping[str, F32]) -> None:
         """Write an intermediate picture and let Blender draw it."""
@@ -60,11 +60,11 @@ class ResultWriter:
             final.stamp_data_add_field(key, text)
 
 
-def _fit(source: F32, length: int, target: Any) -> F32:
+def _fit(source: F32, length: int, name: str) -> F32:
     """The buffer as flat float32 of exactly the length Blender allocated. Raises ValueError if it cannot be."""
     flat = np.ascontiguousarray(source, dtype=np.float32).reshape(-1)
     if len(flat) != length:
         raise ValueError(
-            f'Pass "{target.name}": Blender wants {length} floats, the film has shape {source.shape}. Please report this.'
+            f'Pass "{name}": Blender wants {length} floats, the film has shape {source.shape}. Please report this.'
         )
     return flat
