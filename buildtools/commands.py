@@ -78,7 +78,7 @@ def check(arguments: Arguments) -> int:
 def package(arguments: Arguments) -> int:
     from buildtools.package import build_extension
 
-    ensure_environment()
+    _prepare(arguments)  # the wheel is made from the same compilation
     print(build_extension([python for python in arguments.python.split(",") if python], arguments.isa))
     return 0
 

@@ -20,6 +20,10 @@ def compile_core(isas: str = "v2;v3;v4", jobs: int = 0, sanitize: bool = False) 
         raise BuildFailure("no C++ compiler found; install one that knows C++20 (e.g. the package g++, 12 or later)")
     folder = SANITIZE_BUILD if sanitize else BUILD
     _configure(folder, isas, sanitize)
+    for stale in (NATIVE / "luch").glob("_core_*.so"):
+        # A core of an earlier, wider build would be loaded on another processor, and be of another version.
+        if stale.name.split(".")[0] not in [f"_core_{isa}" for isa in isas.split(";")]:
+            stale.unlink()
     require(
         [tool("cmake"), "--build", str(folder), "-j", str(jobs or os.cpu_count() or 1)],
         "the core did not compile; the compiler's first error is above",

@@ -133,9 +133,7 @@ def main() -> None:
     r32, r16 = axis(32), axis(16)
     iors = [ior_of_z(z) for z in axis(16)]
     parts = [
-        declaration(
-            "GGX_ALBEDO", "[mu 32][roughness 32]", [albedo_reflection(r, m, fine) for m in r32 for r in r32]
-        ),
+        declaration("GGX_ALBEDO", "[mu 32][roughness 32]", [albedo_reflection(r, m, fine) for m in r32 for r in r32]),
         declaration(
             "GGX_MEAN_ALBEDO",
             "[roughness 32]",

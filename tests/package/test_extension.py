@@ -1,0 +1,58 @@
+"""The extension zip: built, validated by Blender's own tool, installed into an empty user folder, rendering."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture(scope="module")
+def extension_zip() -> Path:
+    """Built as a user builds it, for the instruction sets that the tests' core was built for."""
+    isas = sorted(
+        {path.name.split(".")[0].removeprefix("_core_") for path in (ROOT / "native/luch").glob("_core_*.so")}
+    )
+    command = [sys.executable, str(ROOT / "build.py"), "package", "--isa", ";".join(isas)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return Path(result.stdout.strip().splitlines()[-1])
+
+
+def test_zip_holds_the_addon_the_manifest_and_one_wheel(extension_zip: Path) -> None:
+    names = zipfile.ZipFile(extension_zip).namelist()
+    wheels = [name for name in names if name.endswith(".whl")]
+    assert {"__init__.py", "blender_manifest.toml", "LICENSE"} <= set(names)
+    assert len(wheels) == 1 and "cp313" in wheels[0]
+    assert not [name for name in names if name.endswith((".pyc", ".so")) or "test" in name]
+
+
+def test_wheel_holds_every_module_of_the_core_and_no_foreign_one(extension_zip: Path, tmp_path: Path) -> None:
+    archive = zipfile.ZipFile(extension_zip)
+    wheel = next(name for name in archive.namelist() if name.endswith(".whl"))
+    packed = set(zipfile.ZipFile(archive.extract(wheel, tmp_path)).namelist())
+    sources = {f"luch/{path.relative_to(ROOT / 'native/luch')}" for path in (ROOT / "native/luch").rglob("*.py")}
+    cores = {f"luch/{path.name}" for path in (ROOT / "native/luch").glob("_core_*cpython-313*.so")}
+    assert {name for name in packed if name.startswith("luch/")} == sources | cores
+
+
+def test_installed_from_the_zip_into_an_empty_user_folder_it_renders(extension_zip: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "picture.png"
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    environment["BLENDER_USER_RESOURCES"] = str(tmp_path / "user")
+    script = Path(__file__).with_name("install_and_render.py")
+    command = [sys.executable, str(script), str(extension_zip), str(picture)]
+    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert "INSTALLED luch._core_" in result.stdout, (result.stdout + result.stderr)[-3000:]
+    pixels = np.asarray(oiio.ImageInput.open(str(picture)).read_image(oiio.FLOAT))
+    assert pixels.shape[:2] == (32, 48)
+    assert 0.02 < pixels[..., :3].mean() < 0.98 and pixels[..., :3].std() > 0.02, "a picture, not a blank"
