@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import traceback
+from collections.abc import Callable
 from typing import Any
 
 import bpy
+from luch.scene import Scene
 
 from . import passes
 from .export.cache import MeshCache
@@ -14,6 +16,9 @@ from .result import ResultWriter
 
 # Statistics of the last render of each scene, by its name: what panels, scripts and tests read.
 last_stats: dict[str, dict[str, Any]] = {}
+
+# Takes the exported scene instead of the renderer, while capture_scene waits for it.
+_receiver: Callable[[Scene], None] | None = None
 
 
 class LuchRenderEngine(bpy.types.RenderEngine):
@@ -26,11 +31,11 @@ class LuchRenderEngine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True
 
-    def update_render_passes(self, scene: Any, renderlayer: Any) -> None:  # type: ignore[override]
+    def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
         """Blender asks which passes there will be."""
         passes.register_passes(self, scene, renderlayer)
 
-    def render(self, depsgraph: Any) -> None:  # type: ignore[override]
+    def render(self, depsgraph: Any) -> None:
         """One view layer of one frame. Whatever goes wrong ends as a sentence for the user: an exception that got
         through here would count as a finished render, or crash Blender when it saves the file."""
         try:
@@ -48,6 +53,9 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         reporter.say("Exporting scene")
         scene = export.export_scene(depsgraph, self, cache=self._mesh_cache(depsgraph))
         reporter.warn(scene.warnings)
+        if _receiver is not None:
+            _receiver(scene)
+            return
         with ResultWriter(self, depsgraph.view_layer.name, scene.film) as writer:
             result = render.render(scene, progress=lambda progress: reporter.progress(progress, writer))
             writer.write(result.passes)
@@ -62,6 +70,30 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         if not hasattr(self, "_cache"):
             self._cache = MeshCache()
         return self._cache
+
+
+def capture_scene(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Scene:
+    """A view layer as a render of the current frame would see it: with what is shown in renders, at render quality.
+
+    Only a render evaluates a file so; it is started, and ends after the export. Raises RuntimeError, with the reason,
+    if the export fails.
+    """
+    global _receiver
+    captured: list[Scene] = []
+    render = scene.render
+    before = render.engine, render.use_compositing, render.use_sequencer
+    _receiver = captured.append
+    try:
+        setattr(render, "engine", LuchRenderEngine.bl_idname)
+        render.use_compositing = render.use_sequencer = False
+        bpy.ops.render.render(scene=scene.name, layer=view_layer.name)
+    finally:
+        _receiver = None
+        setattr(render, "engine", before[0])
+        render.use_compositing, render.use_sequencer = before[1:]
+    if not captured:
+        raise RuntimeError(f'View layer "{view_layer.name}" was not rendered: enable it for rendering.')
+    return captured[0]
 
 
 def register() -> None:

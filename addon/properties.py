@@ -1,8 +1,5 @@
 """Luch's settings in a .blend file: `scene.luch` and `view_layer.luch`. Names shared with Cycles mean the same."""
 
-# mypy: disable-error-code="valid-type"
-# (bpy reads properties from annotations that are calls)
-
 from __future__ import annotations
 
 from typing import Any

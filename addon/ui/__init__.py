@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from . import panels, stock
+from . import operators, panels, stock
 
 
 def register() -> None:
+    operators.register()
     panels.register()
     stock.register()
 
@@ -13,3 +14,4 @@ def register() -> None:
 def unregister() -> None:
     stock.unregister()
     panels.unregister()
+    operators.unregister()

@@ -42,7 +42,9 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
 
     def draw(self, context: Any) -> None:
         draw_settings(self.layout, context.scene, "samples", "time_limit", "seed", "use_animated_seed")
-        self.layout.prop(context.scene.luch, "follow_cycles")
+        row = self.layout.row(align=True)
+        row.prop(context.scene.luch, "follow_cycles")
+        row.operator("luch.follow_cycles", text="", icon="LOOP_BACK")
 
 
 class LUCH_RENDER_PT_lights(LuchPanel, bpy.types.Panel):
