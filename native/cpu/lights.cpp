@@ -16,10 +16,12 @@ struct LightStore::Arrays {
     std::vector<LampBoxNode> boxes;
     std::vector<u32> instance_emitters, triangle_emitters, suns;
     std::vector<float> sun_irradiance;
+    std::vector<u8> instance_sides, mesh_sides;  // mesh_sides: 0: not asked yet
     WorldArrays world;
 
     void add_lamps(const std::vector<LampInput>& inputs);
     void add_triangles(const SceneView& scene, const std::vector<Color>& estimates);
+    u8 sides_of(const SceneView& scene, const InstanceView& at);
     void add_instance(const SceneView& scene, u32 instance, const std::vector<Color>& estimates);
 };
 
@@ -44,9 +46,18 @@ bool any_light(const SceneView& scene, const InstanceView& at) {
     return false;
 }
 
-// False: no area, or not finite.
-bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, const MaterialView& material, Color estimate,
-                     EmitterBounds* b) {
+// Everything on it emits and hides what lies behind.
+bool all_light(const SceneView& scene, const InstanceView& at) {
+    for (u32 slot = 0; slot < std::max(at.material_count, 1u); ++slot) {
+        u32 index;
+        const MaterialView& material = material_of(scene, at, slot, &index);
+        if (!samples_as_light(material) || (material.program.flags & PROGRAM_TRANSPARENT) != 0u) return false;
+    }
+    return true;
+}
+
+// False: no area, or not finite. sides: 1 front, 2 back, 3 both.
+bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, u32 sides, Color estimate, EmitterBounds* b) {
     const InstanceView& at = scene.instances[instance];
     const MeshView& mesh = scene.meshes[at.mesh];
     const u32* index = scene.triangles + static_cast<u64>(mesh.first_triangle + prim) * 3u;
@@ -56,14 +67,14 @@ bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, const Mater
     Vec3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     float double_area = length(normal);
     if (!(double_area > 0.0f && finite_f(double_area))) return false;
-    bool back_only = material.emission_sampling == 2u;
+    bool back_only = sides == 2u;
     bool flip = back_only != ((at.flags & INSTANCE_MIRRORED) != 0u);
     b->low = min_v(corner[0], min_v(corner[1], corner[2]));
     b->high = max_v(corner[0], max_v(corner[1], corner[2]));
     b->axis = normal / (flip ? -double_area : double_area);
     b->normals_rad = 0.0f;
     b->emission_rad = HALF_PI;
-    b->two_sided = material.emission_sampling == 3u;
+    b->two_sided = sides == 3u;
     float strength = luminance(abs_v(estimate));
     b->intensity = clamp_f((strength > 0.0f && finite_f(strength) ? strength : 1.0f) * 0.5f * double_area, 1e-30f, 1e30f);
     return finite_v(b->low) && finite_v(b->high);
@@ -91,19 +102,28 @@ void LightStore::Arrays::add_lamps(const std::vector<LampInput>& inputs) {
     }
 }
 
+u8 LightStore::Arrays::sides_of(const SceneView& scene, const InstanceView& at) {
+    if (!all_light(scene, at)) return 3;
+    if (mesh_sides.size() <= at.mesh) mesh_sides.resize(at.mesh + 1, 0);
+    if (mesh_sides[at.mesh] == 0) mesh_sides[at.mesh] = outer_sides(scene, scene.meshes[at.mesh]);
+    return mesh_sides[at.mesh];
+}
+
 void LightStore::Arrays::add_instance(const SceneView& scene, u32 instance, const std::vector<Color>& estimates) {
     const InstanceView& at = scene.instances[instance];
     const MeshView& mesh = scene.meshes[at.mesh];
     u32 first = static_cast<u32>(triangle_emitters.size());
     triangle_emitters.resize(first + mesh.triangle_count, NONE);
     instance_emitters[instance] = first;
+    instance_sides[instance] = sides_of(scene, at);
     for (u32 prim = 0; prim < mesh.triangle_count; ++prim) {
         u32 index;
         const MaterialView& material = material_of(scene, at, scene.material_slots[mesh.first_triangle + prim], &index);
         EmitterBounds b{};
-        if (!samples_as_light(material)) continue;
+        u32 sides = material.emission_sampling & instance_sides[instance];
+        if (!samples_as_light(material) || sides == 0u) continue;
         Color estimate = index < estimates.size() ? estimates[index] : Color{1.0f, 1.0f, 1.0f};
-        if (!triangle_bounds(scene, instance, prim, material, estimate, &b)) continue;
+        if (!triangle_bounds(scene, instance, prim, sides, estimate, &b)) continue;
         triangle_emitters[first + prim] = static_cast<u32>(emitters.size());
         emitters.push_back({NONE, instance, prim, NONE});
         bounds.push_back(b);
@@ -112,6 +132,7 @@ void LightStore::Arrays::add_instance(const SceneView& scene, u32 instance, cons
 
 void LightStore::Arrays::add_triangles(const SceneView& scene, const std::vector<Color>& estimates) {
     instance_emitters.assign(scene.instance_count, NONE);
+    instance_sides.assign(scene.instance_count, 3);
     for (u32 i = 0; i < scene.instance_count; ++i)
         if (any_light(scene, scene.instances[i])) add_instance(scene, i, estimates);
 }
@@ -138,6 +159,7 @@ void LightStore::build(const SceneView& scene, const std::vector<LampInput>& lam
     v.nodes = a.nodes.data();
     v.instance_emitters = a.instance_emitters.data();
     v.triangle_emitters = a.triangle_emitters.data();
+    v.instance_sides = a.instance_sides.data();
     v.boxes = a.boxes.data();
     v.suns = a.suns.data();
     v.sun_irradiance = a.sun_irradiance.data();

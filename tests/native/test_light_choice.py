@@ -240,3 +240,18 @@ def test_ten_thousand_identical_triangles_build_a_bounded_tree() -> None:
     assert lights.counts()["nodes"] < 2_000
     truth = 10_000 * polygon_irradiance(triangle, (0.2, 0.2, 0.0), UP)
     assert irradiance(lights, (0.2, 0.2, 0.0), UP) == pytest.approx(truth, rel=0.01)
+
+
+def test_a_closed_emissive_mesh_is_sampled_on_its_outside_only() -> None:
+    corners = [[x, y, z] for z in (2, 3) for y in (0, 1) for x in (0, 1)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]  # normals outward
+    triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
+    for inside_out in (False, True):
+        lights = mesh_light(corners, [t[::-1] for t in triangles] if inside_out else triangles)
+        s = lights.sample(rows(ORIGIN, 256), rows(UP, 256), False, numbers(256))
+        assert set(s["prim"][s["kind"] == TRIANGLE]) == {0, 1}  # of the six faces the bottom one alone is seen
+        truth = polygon_irradiance([corners[i] for i in (0, 2, 3, 1)], ORIGIN, UP)
+        assert irradiance(lights, ORIGIN, UP) == pytest.approx(truth, rel=1e-3)
+    opened = mesh_light(corners, triangles[:-1])
+    s = opened.sample(rows(ORIGIN, 256), rows(UP, 256), False, numbers(256))
+    assert len(set(s["prim"][s["kind"] == TRIANGLE])) > 2

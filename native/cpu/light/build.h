@@ -29,6 +29,10 @@ EmitterBounds lamp_bounds(const LampView& lamp);
 void build_light_tree(const std::vector<EmitterBounds>& bounds, ThreadPool& pool, std::vector<LightTreeNode>* nodes,
                       std::vector<u32>* slots);
 
+// Sides of a mesh's triangles that are worth sampling when all of it emits: 1 (front) for a closed mesh, 2 if it
+// is inside out, 3 for an open one. From inside a closed emitter every ray finds it by itself.
+u8 outer_sides(const SceneView& scene, const MeshView& mesh);
+
 std::vector<LampBoxNode> build_lamp_boxes(const std::vector<LampView>& lamps);
 
 struct WorldArrays {

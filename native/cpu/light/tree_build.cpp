@@ -132,6 +132,7 @@ class Builder {
         for (int i = 0; i < LIGHT_WIDTH; ++i) {
             node.child[i] = NONE;
             node.axis_z[i] = 1.0f;
+            node.fold[i] = 1.0f;
             node.cos_normals[i] = -1.0f;
             node.cos_reach[i] = -2.0f;
         }
@@ -235,7 +236,7 @@ class Builder {
         node->sin_normals[i] = std::sin(b.cone.normals);
         float reach = b.cone.normals + b.cone.emission;
         node->cos_reach[i] = reach >= PI ? -2.0f : std::cos(reach);
-        node->two_sided[i] = b.cone.two_sided ? 1.0f : 0.0f;
+        node->fold[i] = b.cone.two_sided ? -1.0f : 1.0f;
         node->intensity[i] = static_cast<float>(std::clamp(b.intensity, 1e-30, 1e30));
     }
 

@@ -6,11 +6,13 @@
 #define LUCH_CUDA 1
 #define LUCH_FN __host__ __device__ __forceinline__
 #define LUCH_FN_SLOW __host__ __device__ __noinline__
+#define LUCH_FN_APART __host__ __device__ __noinline__
 #define LUCH_CONST __device__ constexpr
 #else
 #define LUCH_CUDA 0
 #define LUCH_FN inline __attribute__((always_inline))
 #define LUCH_FN_SLOW inline
+#define LUCH_FN_APART inline __attribute__((noinline))  // a loop over lanes, vectorised on its own
 #define LUCH_CONST inline constexpr
 #endif
 

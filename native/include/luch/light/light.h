@@ -102,6 +102,7 @@ struct LightsView {
     const LightTreeNode* nodes;         // nodes[0]: the root
     const u32* instance_emitters;       // per instance: offset into triangle_emitters; NONE: emits nothing
     const u32* triangle_emitters;       // emitter of each triangle of such instances; NONE
+    const u8* instance_sides;           // per instance: sides worth sampling, 1 front, 2 back, 3 both
     const LampBoxNode* boxes;           // boxes[0]: the root
     const u32* suns;                    // lamp indices
     const float* sun_irradiance;        // luminance

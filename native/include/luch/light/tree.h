@@ -20,7 +20,7 @@ struct alignas(64) LightTreeNode {
     float cos_normals[LIGHT_WIDTH];   // half angle of that cone
     float sin_normals[LIGHT_WIDTH];
     float cos_reach[LIGHT_WIDTH];     // of the cone that holds all light; -2: everywhere
-    float two_sided[LIGHT_WIDTH];     // 1: light leaves along -normal too
+    float fold[LIGHT_WIDTH];          // -1: light leaves along -normal too; 1: it does not
     float intensity[LIGHT_WIDTH];     // W/sr along the axis, all emitters together; 0: no child
     u32 child[LIGHT_WIDTH];           // node, or emitter | CHILD_IS_EMITTER
     u32 parent_slot;                  // LIGHT_WIDTH * node + lane above; NONE: the root
@@ -33,80 +33,82 @@ struct Emitter {
     u32 slot;            // LIGHT_WIDTH * node + lane where it hangs
 };
 
-// Where light is wanted. normal_weight 0: in a volume, or from all sides.
+// Where light is wanted, with its two switches also as numbers, so that the loop over children has no branch.
 struct LightQuery {
     Vec3 p, n;
     bool transmits, volume;
+    float fold;            // -1: light from behind n counts as much; 1: it does not count
+    float always_above;    // huge: nothing lies behind
+    float least_received;  // 1: no normal
 };
 
-LUCH_FN LightQuery make_light_query(Vec3 p, Vec3 n, bool transmits) { return {p, n, transmits, is_zero(n)}; }
+LUCH_FN LightQuery make_light_query(Vec3 p, Vec3 n, bool transmits) {
+    bool volume = is_zero(n);
+    return {p, n, transmits, volume, transmits ? -1.0f : 1.0f, transmits || volume ? 1e30f : 0.0f, volume ? 1.0f : 0.0f};
+}
 
 // Irradiance that one child may give, roughly; 0 only if it gives none. Slack keeps rounding from cutting off light.
 LUCH_FN float child_importance(const LightTreeNode& node, int i, const LightQuery& q) {
     float dx = node.center_x[i] - q.p.x, dy = node.center_y[i] - q.p.y, dz = node.center_z[i] - q.p.z;
     float hx = node.half_x[i], hy = node.half_y[i], hz = node.half_z[i];
-    float d2 = dx * dx + dy * dy + dz * dz, r2 = hx * hx + hy * hy + hz * hz;
-    bool outside = d2 > r2;
-    float inverse_d = 1.0f / sqrt_f(max_f(d2, 1e-35f));
-    // Half angle that the ball around the box fills.
-    float sin2_u = r2 * inverse_d * inverse_d;
-    sin2_u = outside ? sin2_u : 1.0f;
-    float sin_u = sqrt_f(sin2_u);
-    float cos_u = sqrt_f(max_f(1.0f - sin2_u, 0.0f));
+    float d2 = max_f(dx * dx + dy * dy + dz * dz, 1e-35f), r2 = hx * hx + hy * hy + hz * hz;
+    float inverse_d = 1.0f / sqrt_f(d2);
+    // Half angle that the ball around the box fills. From inside the ball: everything, as sine 1 and cosine -1.
+    float sin_u = sqrt_f(min_f(r2 * inverse_d * inverse_d, 1.0f));
+    float cos_u = sqrt_f(max_f(1.0f - sin_u * sin_u, 0.0f));
+    cos_u = d2 > r2 ? cos_u : -1.0f;
 
     // Receiving side: the smallest and the largest angle between the normal and anything in the ball.
-    float facing = (q.n.x * dx + q.n.y * dy + q.n.z * dz);
+    float facing = q.n.x * dx + q.n.y * dy + q.n.z * dz;
     float reach_up = abs_f(q.n.x) * hx + abs_f(q.n.y) * hy + abs_f(q.n.z) * hz;
     float cos_i = facing * inverse_d;
-    cos_i = q.transmits ? abs_f(cos_i) : cos_i;
+    cos_i = max_f(cos_i, q.fold * cos_i);
     float sin_i = sqrt_f(max_f(1.0f - cos_i * cos_i, 0.0f));
     float best_i = cos_i * cos_u + sin_i * sin_u;
-    float worst_i = cos_i * cos_u - sin_i * sin_u;
-    best_i = (cos_i >= cos_u || !outside) ? 1.0f : best_i;
-    worst_i = outside ? max_f(worst_i, 0.0f) : 0.0f;
-    float receive = 0.5f * (max_f(best_i, 0.02f) + worst_i);
-    bool above = facing + reach_up > -1e-5f * (abs_f(facing) + reach_up) || q.transmits;
-    receive = above ? receive : 0.0f;
-    receive = q.volume ? 1.0f : receive;
+    best_i = cos_i >= cos_u ? 1.0f : best_i;
+    float worst_i = d2 > r2 ? cos_i * cos_u - sin_i * sin_u : 0.0f;
+    float receive = 0.5f * (max_f(best_i, 0.02f) + max_f(worst_i, 0.0f));
+    float above = facing + reach_up + q.always_above + 1e-5f * (abs_f(facing) + reach_up);
+    receive = above > 0.0f ? max_f(receive, q.least_received) : 0.0f;
 
     // Sending side: the smallest angle between any normal and the direction to any place the point is seen from.
     float cos_e = -(node.axis_x[i] * dx + node.axis_y[i] * dy + node.axis_z[i] * dz) * inverse_d;
-    cos_e = node.two_sided[i] > 0.0f ? abs_f(cos_e) : cos_e;
+    cos_e = max_f(cos_e, node.fold[i] * cos_e);
     float sin_e = sqrt_f(max_f(1.0f - cos_e * cos_e, 0.0f));
     float near_cos = cos_e * cos_u + sin_e * sin_u;
-    float near_sin = sin_e * cos_u - cos_e * sin_u;
-    bool within = cos_e >= cos_u || !outside;
-    near_cos = within ? 1.0f : near_cos;
-    near_sin = within ? 0.0f : max_f(near_sin, 0.0f);
+    float near_sin = max_f(sin_e * cos_u - cos_e * sin_u, 0.0f);
+    near_cos = cos_e >= cos_u ? 1.0f : near_cos;
+    near_sin = cos_e >= cos_u ? 0.0f : near_sin;
     float send = near_cos * node.cos_normals[i] + near_sin * node.sin_normals[i];
-    send = near_cos >= node.cos_normals[i] ? 1.0f : send;
-    send = max_f(send, 0.02f);
-    bool seen = near_cos > node.cos_reach[i] - 1e-4f;
-    send = seen ? send : 0.0f;
+    send = near_cos >= node.cos_normals[i] ? 1.0f : max_f(send, 0.02f);
+    send = near_cos > node.cos_reach[i] - 1e-4f ? send : 0.0f;
 
     // Within the ball an emitter may be anywhere: its mean share is that of some radius, not of the centre.
     return node.intensity[i] * receive * send / max_f(max_f(d2, 0.25f * r2), 1e-20f);
 }
 
 // Importance of every child; returns their sum.
-LUCH_FN float node_importances(const LightTreeNode& node, const LightQuery& q, float* importance) {
-    for (int i = 0; i < LIGHT_WIDTH; ++i) importance[i] = child_importance(node, i, q);
-    float sum = 0.0f;
-    for (int i = 0; i < LIGHT_WIDTH; ++i) sum += importance[i];
-    return sum;
+LUCH_FN_APART float node_importances(const LightTreeNode& node, const LightQuery& query, float* importance) {
+    const LightQuery q = query;
+    alignas(64) float result[LIGHT_WIDTH];
+    for (int i = 0; i < LIGHT_WIDTH; ++i) result[i] = child_importance(node, i, q);
+    for (int i = 0; i < LIGHT_WIDTH; ++i) importance[i] = result[i];
+    // Pairwise: a chain of sixteen additions would wait for each other.
+    for (int i = 0; i < 8; ++i) result[i] += result[i + 8];
+    for (int i = 0; i < 4; ++i) result[i] += result[i + 4];
+    return (result[0] + result[2]) + (result[1] + result[3]);
 }
 
 // Picks a child in proportion; *u becomes a fresh number in [0, 1). sum > 0.
 LUCH_FN int choose_child(const float* importance, float sum, float* u) {
-    float target = *u * sum;
-    int chosen = -1;
-    float before = 0.0f, running = 0.0f;
+    float target = *u * sum, before = 0.0f, running = 0.0f;
+    int chosen = 0;
     for (int i = 0; i < LIGHT_WIDTH; ++i) {
-        if (importance[i] > 0.0f && (chosen < 0 || running <= target)) {
-            chosen = i;
-            before = running;
-        }
+        if (!(importance[i] > 0.0f)) continue;
+        chosen = i;  // the last one takes what rounding leaves over
+        before = running;
         running += importance[i];
+        if (target < running) break;
     }
     *u = clamp_f((target - before) / importance[chosen], 0.0f, 0.99999994f);
     return chosen;
