@@ -117,8 +117,9 @@ LUCH_FN Vec3 sample_visible_ggx(const Lobe& l, Vec3 o, float bound, Vec2 u) {
     Vec3 std_o = normalize(make_vec3(l.alpha_x * o.x, l.alpha_y * o.y, o.z));
     float low = bound * std_o.z;
     float z = (1.0f - u.y) * (1.0f + low) - low;
-    float r = safe_sqrt(1.0f - z * z), phi = TWO_PI * u.x;
-    Vec3 h = make_vec3(r * cos_f(phi), r * sin_f(phi), z) + std_o;
+    float r = safe_sqrt(1.0f - z * z), sine, cosine;
+    sincos_f(TWO_PI * u.x, &sine, &cosine);
+    Vec3 h = make_vec3(r * cosine, r * sine, z) + std_o;
     return normalize_or(make_vec3(l.alpha_x * h.x, l.alpha_y * h.y, max_f(h.z, 0.0f)), make_vec3(0.0f, 0.0f, 1.0f));
 }
 

@@ -10,6 +10,8 @@ namespace luch {
 // bounce over the hemisphere; the bounces beyond the first are tinted by it.
 // Source: Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks", appendix.
 LUCH_FN void compensate_energy(Lobe& lobe, Vec3 wo, Color mean_fresnel) {
+    // Facets between equal media do not exist: straight light loses nothing that could be put back.
+    if (lobe.type == LobeType::MICROFACET_GLASS && abs_f(lobe.ior - 1.0f) < STRAIGHT_IOR) return;
     float mu = dot(wo, lobe.normal), roughness = table_roughness(lobe.alpha_x, lobe.alpha_y);
     Albedo e = lobe.type == LobeType::MICROFACET_GLASS ? glass_albedo(roughness, mu, lobe.ior)
                                                        : reflection_albedo(roughness, mu);

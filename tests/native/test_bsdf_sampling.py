@@ -1,0 +1,120 @@
+"""Closure samples follow the density they claim: chi-square over the sphere, and sample against eval."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from luch import core
+from numpy.typing import NDArray
+from scipy import stats
+
+Floats = NDArray[np.float64]
+CAMERA, BACKFACING = 1, 512
+SAMPLES = 60_000
+LATITUDES, LONGITUDES = 16, 24  # bins
+FINE_Z, FINE_PHI = 32, 12  # Gauss-Legendre points per bin
+
+GLOSSY = {"roughness": 0.5}
+TANGENT = {"tangent": (0.8, 0.6, 0.0)}
+LOBES: dict[str, tuple[str, dict[str, Any], int]] = {
+    "lambert": ("diffuse", {}, CAMERA),
+    "oren-nayar": ("diffuse", {"roughness": 0.7}, CAMERA),
+    "translucent": ("translucent", {}, CAMERA),
+    "ggx": ("glossy", {**GLOSSY, "distribution": "GGX"}, CAMERA),
+    "ggx rough": ("glossy", {"roughness": 1.0, "distribution": "GGX"}, CAMERA),
+    "ggx anisotropic": ("glossy", {"roughness": 0.6, "anisotropy": 0.5, "distribution": "GGX", **TANGENT}, CAMERA),
+    "beckmann": ("glossy", {**GLOSSY, "distribution": "BECKMANN"}, CAMERA),
+    "beckmann anisotropic": (
+        "glossy",
+        {"roughness": 0.6, "anisotropy": -0.4, "distribution": "BECKMANN", **TANGENT},
+        CAMERA,
+    ),
+    "ashikhmin-shirley": ("glossy", {**GLOSSY, "distribution": "ASHIKHMIN_SHIRLEY"}, CAMERA),
+    "ashikhmin-shirley anisotropic": (
+        "glossy",
+        {"roughness": 0.6, "anisotropy": 0.5, "distribution": "ASHIKHMIN_SHIRLEY", **TANGENT},
+        CAMERA,
+    ),
+    "glass": ("glass", {**GLOSSY}, CAMERA),
+    "glass from inside": ("glass", {**GLOSSY}, CAMERA | BACKFACING),
+    "glass beckmann": ("glass", {**GLOSSY, "distribution": "BECKMANN"}, CAMERA),
+    "refraction": ("refraction", {"roughness": 0.6, "distribution": "GGX"}, CAMERA),
+    "sheen": ("sheen", {"roughness": 0.5}, CAMERA),
+    "velvet": ("velvet", {"roughness": 0.5}, CAMERA),
+    "conductor": ("metallic", {"physical": True}, CAMERA),
+    "principled": ("principled", {"coat_weight": 0.5, "coat_roughness": 0.4, "sheen_weight": 0.5}, CAMERA),
+    "thin glass": ("principled", {"thin_wall": True, "transmission_weight": 1.0}, CAMERA),
+    "thin subsurface": (
+        "principled",
+        {"thin_wall": True, "subsurface_weight": 1.0, "diffuse_roughness": 0.5, "roughness": 0.6},
+        CAMERA,
+    ),
+}
+ANGLES = (0.0, 45.0, 80.0, 89.5)
+
+
+def closures(name: str, degrees: float) -> Any:
+    node, inputs, flags = LOBES[name]
+    a = math.radians(degrees)
+    return core.bsdf.Closures(node, inputs, wo=(math.sin(a), 0.0, math.cos(a)), path_flags=flags)
+
+
+def expected_counts(c: Any) -> Floats:
+    """SAMPLES times the density's integral over each bin of cos(theta) and phi."""
+    (at_z, weight_z), (at_phi, weight_phi) = (np.polynomial.legendre.leggauss(n) for n in (FINE_Z, FINE_PHI))
+    z = ((np.arange(LATITUDES)[:, None] + 0.5 + 0.5 * at_z) / LATITUDES * 2.0 - 1.0).ravel()
+    phi = ((np.arange(LONGITUDES)[:, None] + 0.5 + 0.5 * at_phi) / LONGITUDES * 2.0 * np.pi).ravel()
+    grid_z, grid_phi = np.meshgrid(z, phi, indexing="ij")
+    r = np.sqrt(1.0 - grid_z**2)
+    w = np.stack([r * np.cos(grid_phi), r * np.sin(grid_phi), grid_z], axis=-1).reshape(-1, 3)
+    pdf = c.eval(w.astype(np.float32))[1].astype(float)
+    pdf = pdf.reshape(LATITUDES, FINE_Z, LONGITUDES, FINE_PHI)
+    mass = np.einsum("azbp,z,p->ab", pdf, 0.5 * weight_z, 0.5 * weight_phi)
+    return mass * 4.0 * np.pi / (LATITUDES * LONGITUDES) * SAMPLES
+
+
+def observed_counts(drawn: dict[str, Any]) -> Floats:
+    kept = drawn["pdf"] > 0.0
+    d = drawn["direction"][kept]
+    row = np.minimum(((d[:, 2] + 1.0) / 2.0 * LATITUDES).astype(int), LATITUDES - 1)
+    turn = np.arctan2(d[:, 1], d[:, 0]) / (2.0 * np.pi) % 1.0
+    column = np.minimum((turn * LONGITUDES).astype(int), LONGITUDES - 1)
+    return np.bincount(row * LONGITUDES + column, minlength=LATITUDES * LONGITUDES).reshape(LATITUDES, LONGITUDES)
+
+
+@pytest.mark.parametrize("degrees", ANGLES)
+@pytest.mark.parametrize("name", LOBES)
+def test_samples_follow_their_density(name: str, degrees: float) -> None:
+    c = closures(name, degrees)
+    drawn = c.sample(np.random.default_rng(7).random((SAMPLES, 3), dtype=np.float32))
+    expected, observed = expected_counts(c).ravel(), observed_counts(drawn).ravel()
+    # What the density leaves over are draws that found no direction.
+    expected = np.append(expected, max(SAMPLES - expected.sum(), 0.0))
+    observed = np.append(observed, SAMPLES - observed.sum())
+    order = np.argsort(expected)
+    expected, observed = expected[order], observed[order]
+    small = np.searchsorted(expected, 10.0)  # rare bins count together
+    expected = np.append(expected[small:], expected[:small].sum())
+    observed = np.append(observed[small:], observed[:small].sum())
+    # Quadrature is good to a fraction of a percent per bin: that is no statistical difference.
+    slack = 0.004 * expected + 0.004 * SAMPLES / len(expected)
+    excess = np.maximum(np.abs(observed - expected) - slack, 0.0)
+    chi2 = float((excess**2 / np.maximum(expected, 1.0)).sum())
+    p = float(stats.chi2.sf(chi2, len(expected) - 1))
+    assert p > 0.01 / (len(LOBES) * len(ANGLES)), (chi2, len(expected))  # Sidak's level for them all
+
+
+@pytest.mark.parametrize("degrees", ANGLES)
+@pytest.mark.parametrize("name", LOBES)
+def test_sampling_and_evaluation_agree(name: str, degrees: float) -> None:
+    c = closures(name, degrees)
+    drawn = c.sample(np.random.default_rng(8).random((4000, 3), dtype=np.float32))
+    kept = (drawn["pdf"] > 1e-4) & ~drawn["delta"] & (np.abs(drawn["direction"][:, 2]) > 1e-3)
+    assert kept.sum() > 200
+    light, pdf = c.eval(drawn["direction"][kept])
+    assert np.quantile(np.abs(pdf / drawn["pdf"][kept] - 1.0), 0.99) < 2e-3
+    sent = light.sum(axis=1) / pdf[:, None]
+    assert np.quantile(np.abs(sent - drawn["throughput"][kept]), 0.99) < 2e-3
