@@ -12,6 +12,7 @@ void bind_film(py::module_& m);
 void bind_accel(py::module_& m);
 void bind_light(py::module_& m);
 void bind_math(py::module_& m);
+void bind_render(py::module_& m);
 void bind_sampling(py::module_& m);
 void bind_shade(py::module_& m);
 void bind_textures(py::module_& m);

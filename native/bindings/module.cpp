@@ -3,11 +3,12 @@
 PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     m.doc() = "Luch's native core.";
     luch::bindings::bind_bsdf(m);
+    luch::bindings::bind_accel(m);
     luch::bindings::bind_camera(m);
     luch::bindings::bind_film(m);
     luch::bindings::bind_light(m);
     luch::bindings::bind_math(m);
-    luch::bindings::bind_accel(m);
+    luch::bindings::bind_render(m);
     luch::bindings::bind_sampling(m);
     luch::bindings::bind_shade(m);
     luch::bindings::bind_textures(m);

@@ -1,0 +1,394 @@
+#include "bindings/scene_reader.h"
+
+#include <pybind11/stl.h>
+
+#include <array>
+#include <cstring>
+#include <stdexcept>
+
+#include "cpu/camera.h"
+#include "cpu/filter.h"
+
+namespace luch::bindings {
+namespace {
+
+template <class T>
+using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+// Arrays that the inputs point into live as long as the reading does.
+struct Keep {
+    std::vector<py::object> objects;
+    template <class T>
+    Array<T> array(const py::object& source) {
+        Array<T> result = py::cast<Array<T>>(source);
+        objects.push_back(result);
+        return result;
+    }
+};
+
+Color read_color(const py::handle& value) {
+    auto t = py::cast<std::array<float, 3>>(value);
+    return {t[0], t[1], t[2]};
+}
+
+u32 lightgroup_index(const std::vector<std::string>& groups, const std::string& name) {
+    for (size_t i = 0; i < groups.size(); i++) {
+        if (groups[i] == name && !name.empty()) return u32(i + 1);
+    }
+    return 0;
+}
+
+Domain read_domain(const std::string& name) {
+    if (name == "POINT") return Domain::POINT;
+    if (name == "CORNER") return Domain::CORNER;
+    if (name == "FACE") return Domain::FACE;
+    if (name == "MESH") return Domain::MESH;
+    if (name == "NONE") return Domain::NONE_;
+    throw std::invalid_argument("Unknown attribute domain \"" + name + "\".");
+}
+
+struct Reader {
+    py::object scene;
+    cpu::SceneStore& store;
+    cpu::RenderInput& input;
+    std::vector<std::string> lightgroups, aovs;
+
+    Program read_program(const py::object& program, const std::string& owner) {
+        cpu::ProgramSource source;
+        source.owner = owner;
+        auto words = py::cast<Array<u32>>(program.attr("code"));
+        auto constants = py::cast<Array<float>>(program.attr("constants"));
+        auto tables = py::cast<Array<float>>(program.attr("tables"));
+        source.code.assign(words.data(), words.data() + words.size());
+        source.constants.assign(constants.data(), constants.data() + constants.size());
+        source.tables.assign(tables.data(), tables.data() + tables.size());
+        source.register_count = py::cast<u32>(program.attr("register_count"));
+        source.flags = py::cast<u32>(program.attr("flags"));
+        source.images = py::cast<std::vector<u32>>(program.attr("images"));
+        for (const std::string& name : py::cast<std::vector<std::string>>(program.attr("attributes"))) {
+            source.attributes.push_back(store.attribute_id(name));
+        }
+        for (const std::string& name : py::cast<std::vector<std::string>>(program.attr("aovs"))) {
+            u32 found = NONE;
+            for (size_t i = 0; i < aovs.size(); i++) {
+                if (aovs[i] == name) found = u32(i);
+            }
+            source.aovs.push_back(found);
+        }
+        return store.add_program(source);
+    }
+
+    void read_mesh(const py::object& mesh) {
+        Keep keep;
+        cpu::MeshInput in{};
+        in.name = py::cast<std::string>(mesh.attr("name"));
+        auto positions = keep.array<float>(mesh.attr("positions"));
+        auto triangles = keep.array<u32>(mesh.attr("triangles"));
+        auto slots = keep.array<u16>(mesh.attr("material_slots"));
+        if (positions.ndim() != 2 || positions.shape(1) != 3 || triangles.ndim() != 2 || triangles.shape(1) != 3 ||
+            slots.ndim() != 1 || slots.shape(0) != triangles.shape(0)) {
+            throw std::invalid_argument("Mesh \"" + in.name + "\": positions must be (V, 3), triangles (T, 3), " +
+                                        "material_slots (T,).");
+        }
+        in.positions = positions.data();
+        in.vertex_count = size_t(positions.shape(0));
+        in.triangles = triangles.data();
+        in.triangle_count = size_t(triangles.shape(0));
+        in.material_slots = slots.data();
+        if (!mesh.attr("normals").is_none()) {
+            auto normals = keep.array<float>(mesh.attr("normals"));
+            in.normals_domain = read_domain(py::cast<std::string>(mesh.attr("normals_domain")));
+            size_t rows = in.normals_domain == Domain::POINT ? in.vertex_count : in.triangle_count * 3;
+            if (size_t(normals.size()) != rows * 3) {
+                throw std::invalid_argument("Mesh \"" + in.name + "\": normals do not fit their domain.");
+            }
+            in.normals = normals.data();
+        }
+        for (auto item : py::cast<py::dict>(mesh.attr("attributes"))) {
+            py::object attribute = py::reinterpret_borrow<py::object>(item.second);
+            auto data = keep.array<float>(attribute.attr("data"));
+            cpu::AttributeInput a;
+            a.name = py::cast<std::string>(item.first);
+            a.data = data.data();
+            a.rows = size_t(data.shape(0));
+            a.channels = data.ndim() > 1 ? u32(data.shape(1)) : 1u;
+            a.domain = read_domain(py::cast<std::string>(attribute.attr("domain")));
+            in.attributes.push_back(a);
+        }
+        in.uv_active = py::cast<std::string>(mesh.attr("uv_active"));
+        in.color_active = py::cast<std::string>(mesh.attr("color_active"));
+        in.texture_location = read_color(mesh.attr("texture_location"));
+        in.texture_size = read_color(mesh.attr("texture_size"));
+        store.add_mesh(in);
+    }
+
+    void read_material(const py::object& material) {
+        MaterialView view{};
+        std::string name = py::cast<std::string>(material.attr("name"));
+        view.program = read_program(material.attr("surface"), name);
+        view.pass_index = py::cast<float>(material.attr("pass_index"));
+        std::string sampling = py::cast<std::string>(material.attr("emission_sampling"));
+        // AUTO lights from the sides that the program says it emits on.
+        view.emission_sampling = sampling == "NONE" ? 0u : sampling == "FRONT" ? 1u : sampling == "BACK" ? 2u : 3u;
+        if (sampling == "AUTO" && !(view.program.flags & PROGRAM_EMISSION_BACK) &&
+            (view.program.flags & PROGRAM_EMISSION_FRONT)) {
+            view.emission_sampling = 1u;
+        } else if (sampling == "AUTO" && (view.program.flags & PROGRAM_EMISSION_BACK) &&
+                   !(view.program.flags & PROGRAM_EMISSION_FRONT)) {
+            view.emission_sampling = 2u;
+        }
+        view.transparent_shadows = py::cast<bool>(material.attr("transparent_shadows"));
+        view.crypto = crypto_id(name);
+        store.add_material(view);
+        input.material_emission_estimate.push_back(read_color(material.attr("emission_estimate")));
+    }
+
+    float crypto_id(const std::string& name) {
+        return py::cast<float>(py::module_::import("luch.cryptomatte").attr("name_to_id")(name));
+    }
+
+    void read_object(const py::object& object) {
+        cpu::ObjectInput in{};
+        in.mesh = py::cast<u32>(object.attr("mesh"));
+        in.materials = py::cast<std::vector<u32>>(object.attr("materials"));
+        in.pass_index = py::cast<float>(object.attr("pass_index"));
+        auto color = py::cast<std::array<float, 4>>(object.attr("color"));
+        std::copy(color.begin(), color.end(), in.color);
+        in.visibility = py::cast<u32>(object.attr("visibility"));
+        in.holdout = py::cast<bool>(object.attr("holdout"));
+        in.shadow_catcher = py::cast<bool>(object.attr("shadow_catcher"));
+        in.lightgroup = lightgroup_index(lightgroups, py::cast<std::string>(object.attr("lightgroup")));
+        in.crypto_object = crypto_id(py::cast<std::string>(object.attr("name")));
+        in.crypto_asset = crypto_id(py::cast<std::string>(object.attr("asset")));
+        store.add_object(in);
+    }
+
+    u64 read_instances(const py::object& instances) {
+        if (instances.is_none()) return 0;
+        auto object = py::cast<Array<u32>>(instances.attr("object"));
+        auto matrix = py::cast<Array<double>>(instances.attr("matrix"));
+        auto random = py::cast<Array<float>>(instances.attr("random"));
+        auto generated = py::cast<Array<float>>(instances.attr("generated"));
+        auto uv = py::cast<Array<float>>(instances.attr("uv"));
+        size_t count = size_t(object.size());
+        if (size_t(matrix.size()) != count * 12 || size_t(random.size()) != count ||
+            size_t(generated.size()) != count * 3 || size_t(uv.size()) != count * 2) {
+            throw std::invalid_argument("Instances: the arrays differ in length.");
+        }
+        u64 dropped = 0;
+        for (size_t i = 0; i < count; i++) {
+            cpu::InstanceInput in{};
+            in.object = object.data()[i];
+            std::copy(matrix.data() + i * 12, matrix.data() + i * 12 + 12, in.matrix);
+            for (int row = 0; row < 3; row++) in.matrix[row * 4 + 3] -= input.origin[row];
+            in.random = random.data()[i];
+            in.generated = {generated.data()[i * 3], generated.data()[i * 3 + 1], generated.data()[i * 3 + 2]};
+            in.uv = {uv.data()[i * 2], uv.data()[i * 2 + 1]};
+            if (!store.add_instance(in)) dropped++;
+        }
+        return dropped;
+    }
+
+    void read_image(const py::object& image) {
+        py::array pixels = py::cast<py::array>(image.attr("pixels"));
+        std::string name = py::cast<std::string>(image.attr("name"));
+        pixels = py::module_::import("numpy").attr("ascontiguousarray")(pixels);
+        if (pixels.ndim() != 3 || pixels.shape(2) < 1 || pixels.shape(2) > 4 || pixels.size() == 0) {
+            throw std::invalid_argument("Image \"" + name + "\": pixels must be (H, W, 1..4).");
+        }
+        ImageView view{};
+        view.height = u32(pixels.shape(0));
+        view.width = u32(pixels.shape(1));
+        view.channels = u8(pixels.shape(2));
+        size_t size = size_t(pixels.dtype().itemsize());
+        char kind = pixels.dtype().kind();
+        if (kind == 'u' && size == 1) view.format = PixelFormat::U8;
+        else if (kind == 'f' && size == 2) view.format = PixelFormat::F16;
+        else if (kind == 'f' && size == 4) view.format = PixelFormat::F32;
+        else throw std::invalid_argument("Image \"" + name + "\": pixels must be uint8, float16 or float32.");
+        view.srgb = py::cast<std::string>(image.attr("colorspace")) == "SRGB";
+        std::string alpha = py::cast<std::string>(image.attr("alpha"));
+        view.alpha = alpha == "PREMULTIPLIED" ? 1 : alpha == "CHANNEL_PACKED" ? 2 : alpha == "NONE" ? 3 : 0;
+        std::vector<u8> bytes(size_t(pixels.nbytes()));
+        std::memcpy(bytes.data(), pixels.data(), bytes.size());
+        store.add_image(view, std::move(bytes));
+    }
+
+    void read_lamp(const py::object& light) {
+        cpu::LampInput in;
+        std::string kind = py::cast<std::string>(light.attr("kind"));
+        std::string shape = py::cast<std::string>(light.attr("shape"));
+        using Shape = cpu::LampShape;
+        in.shape = kind == "POINT" ? Shape::POINT
+                   : kind == "SPOT" ? Shape::SPOT
+                   : kind == "SUN"  ? Shape::SUN
+                   : shape == "SQUARE" ? Shape::SQUARE
+                   : shape == "RECTANGLE" ? Shape::RECTANGLE
+                   : shape == "DISK" ? Shape::DISK
+                                     : Shape::ELLIPSE;
+        auto matrix = py::cast<Array<double>>(light.attr("matrix"));
+        for (int i = 0; i < 12; i++) {
+            double value = matrix.data()[i];
+            in.matrix.m[i] = float(i % 4 == 3 ? value - input.origin[i / 4] : value);
+        }
+        auto number = [&](const char* name) { return py::cast<float>(light.attr(name)); };
+        in.color = read_color(light.attr("color"));
+        in.power = number("power");
+        in.normalize = py::cast<bool>(light.attr("normalize"));
+        in.radius = number("radius");
+        in.soft_falloff = py::cast<bool>(light.attr("soft_falloff"));
+        in.spot_size = number("spot_size");
+        in.spot_blend = number("spot_blend");
+        in.angle = number("angle");
+        in.size = number("size");
+        in.size_y = number("size_y");
+        in.spread = number("spread");
+        py::object program = light.attr("program");
+        in.has_program = !program.is_none();
+        if (in.has_program) in.program = read_program(program, py::cast<std::string>(light.attr("name")));
+        in.visibility = py::cast<u32>(light.attr("visibility"));
+        in.cast_shadow = py::cast<bool>(light.attr("cast_shadow"));
+        in.use_mis = py::cast<bool>(light.attr("use_mis"));
+        in.max_bounces = py::cast<u32>(light.attr("max_bounces"));
+        in.lightgroup = lightgroup_index(lightgroups, py::cast<std::string>(light.attr("lightgroup")));
+        in.random = number("random");
+        input.lamps.push_back(in);
+    }
+
+    void read_world(const py::object& world) {
+        if (world.is_none()) return;
+        input.world.present = true;
+        Program program = read_program(world.attr("program"), py::cast<std::string>(world.attr("name")));
+        store.set_world_program(program);
+        input.world.visibility = py::cast<u32>(world.attr("visibility"));
+        input.world.lightgroup = lightgroup_index(lightgroups, py::cast<std::string>(world.attr("lightgroup")));
+        bool wanted = py::cast<std::string>(world.attr("sampling")) != "NONE";
+        input.world_map_width = wanted ? py::cast<int>(world.attr("map_resolution")) : 0;
+    }
+
+    void read_camera(const py::object& camera, const py::object& film) {
+        cpu::CameraSpec spec;
+        auto number = [&](const char* name) { return py::cast<double>(camera.attr(name)); };
+        spec.kind = py::cast<std::string>(camera.attr("kind"));
+        auto matrix = py::cast<Array<double>>(camera.attr("matrix"));
+        std::copy(matrix.data(), matrix.data() + 12, spec.matrix);
+        spec.lens_mm = number("lens_mm");
+        spec.sensor_width_mm = number("sensor_width_mm");
+        spec.sensor_height_mm = number("sensor_height_mm");
+        spec.sensor_fit = py::cast<std::string>(camera.attr("sensor_fit"));
+        spec.ortho_scale = number("ortho_scale");
+        spec.shift_x = number("shift_x");
+        spec.shift_y = number("shift_y");
+        spec.clip_start = number("clip_start");
+        spec.clip_end = number("clip_end");
+        spec.use_dof = py::cast<bool>(camera.attr("use_dof"));
+        spec.focus_distance = number("focus_distance");
+        spec.fstop = number("fstop");
+        spec.blades = py::cast<int>(camera.attr("blades"));
+        spec.blades_rotation = number("blades_rotation");
+        spec.aperture_ratio = number("aperture_ratio");
+        auto latitude = py::cast<std::array<double, 2>>(camera.attr("latitude"));
+        auto longitude = py::cast<std::array<double, 2>>(camera.attr("longitude"));
+        std::copy(latitude.begin(), latitude.end(), spec.latitude);
+        std::copy(longitude.begin(), longitude.end(), spec.longitude);
+        cpu::FrameSpec frame;
+        frame.width = py::cast<int>(film.attr("width"));
+        frame.height = py::cast<int>(film.attr("height"));
+        auto aspect = py::cast<std::array<double, 2>>(film.attr("pixel_aspect"));
+        std::copy(aspect.begin(), aspect.end(), frame.pixel_aspect);
+        input.camera = cpu::make_camera_view(spec, frame, input.origin);
+        store.set_camera(input.camera.to_camera, transform_point(input.camera.to_world, {0.0f, 0.0f, 0.0f}));
+    }
+
+    void read_film(const py::object& film) {
+        input.filter = cpu::make_pixel_filter(py::cast<std::string>(film.attr("filter")),
+                                              py::cast<double>(film.attr("filter_width")));
+        cpu::FilmSpec& spec = input.film;
+        spec.width = py::cast<u32>(film.attr("width"));
+        spec.height = py::cast<u32>(film.attr("height"));
+        if (!film.attr("border").is_none()) {
+            auto border = py::cast<std::array<u32, 4>>(film.attr("border"));
+            spec.x0 = border[0], spec.y0 = border[1];
+            spec.width = border[2] - border[0], spec.height = border[3] - border[1];
+        }
+        std::copy(input.origin, input.origin + 3, spec.origin);
+        spec.exposure = py::cast<float>(film.attr("exposure"));
+        spec.passes = py::cast<std::vector<std::string>>(film.attr("passes"));
+        spec.cryptomatte_depth = py::cast<u32>(film.attr("cryptomatte_depth"));
+        spec.lightgroups = lightgroups;
+        for (auto aov : py::cast<py::list>(film.attr("aovs"))) {
+            auto pair = py::cast<py::tuple>(aov);
+            spec.aovs.push_back({py::cast<std::string>(pair[0]), py::cast<std::string>(pair[1]) == "COLOR"});
+        }
+        auto mist = py::cast<py::tuple>(film.attr("mist"));
+        input.mist_start = py::cast<float>(mist[0]);
+        input.mist_depth = py::cast<float>(mist[1]);
+        std::string falloff = py::cast<std::string>(mist[2]);
+        input.mist_exponent = falloff == "LINEAR" ? 1.0f : falloff == "INVERSE_QUADRATIC" ? 0.5f : 2.0f;
+        input.limits.film_transparent = py::cast<bool>(film.attr("transparent"));
+        input.limits.film_transparent_glass = py::cast<bool>(film.attr("transparent_glass"));
+        input.limits.film_transparent_roughness = py::cast<float>(film.attr("transparent_roughness"));
+        input.limits.alpha_threshold = py::cast<float>(film.attr("alpha_threshold"));
+    }
+
+    void read_settings(const py::object& settings) {
+        auto count = [&](const char* name) { return py::cast<u32>(settings.attr(name)); };
+        auto number = [&](const char* name) { return py::cast<float>(settings.attr(name)); };
+        PathLimits& limits = input.limits;
+        limits.bounces = count("max_bounces");
+        limits.diffuse = count("diffuse_bounces");
+        limits.glossy = count("glossy_bounces");
+        limits.transmission = count("transmission_bounces");
+        limits.transparent = count("transparent_bounces");
+        limits.min_bounces = count("min_light_bounces");
+        limits.min_transparent = count("min_transparent_bounces");
+        limits.clamp_direct = number("clamp_direct");
+        limits.clamp_indirect = number("clamp_indirect");
+        limits.filter_glossy = number("filter_glossy");
+        limits.caustics_reflective = py::cast<bool>(settings.attr("caustics_reflective"));
+        limits.caustics_refractive = py::cast<bool>(settings.attr("caustics_refractive"));
+        limits.ao_distance = number("ao_distance");
+        input.light_tree = py::cast<bool>(settings.attr("light_tree"));
+        input.seed = count("seed");
+        input.samples = count("samples");
+        input.threads = count("threads");
+        std::string accelerator = py::cast<std::string>(settings.attr("accelerator"));
+        if (accelerator == "BRUTE_FORCE") input.accel_kind = cpu::AccelKind::BRUTE_FORCE;
+        else if (accelerator != "AUTO" && accelerator != "BVH") {
+            throw std::invalid_argument("Accelerator \"" + accelerator + "\" is not known; take AUTO, BVH or BRUTE_FORCE.");
+        }
+    }
+};
+
+}  // namespace
+
+ReadScene read_scene(const py::object& scene) {
+    ReadScene out;
+    out.store = std::make_unique<cpu::SceneStore>();
+    Reader reader{scene, *out.store, out.input, {}, {}};
+    py::object film = scene.attr("film");
+    reader.lightgroups = py::cast<std::vector<std::string>>(film.attr("lightgroups"));
+    for (auto aov : py::cast<py::list>(film.attr("aovs"))) {
+        reader.aovs.push_back(py::cast<std::string>(py::cast<py::tuple>(aov)[0]));
+    }
+    auto origin = py::cast<std::array<double, 3>>(scene.attr("origin"));
+    std::copy(origin.begin(), origin.end(), out.input.origin);
+    auto each = [&](const char* name, void (Reader::*read)(const py::object&)) {
+        for (auto item : py::cast<py::list>(scene.attr(name))) {
+            (reader.*read)(py::reinterpret_borrow<py::object>(item));
+        }
+    };
+    each("meshes", &Reader::read_mesh);
+    each("materials", &Reader::read_material);
+    each("objects", &Reader::read_object);
+    out.dropped_instances = reader.read_instances(scene.attr("instances"));
+    each("images", &Reader::read_image);
+    each("lights", &Reader::read_lamp);
+    reader.read_world(scene.attr("world"));
+    reader.read_film(film);
+    reader.read_settings(scene.attr("settings"));
+    reader.read_camera(scene.attr("camera"), film);
+    return out;
+}
+
+}  // namespace luch::bindings

@@ -1,0 +1,174 @@
+// Where light and data enter the film: pass rules follow Blender's light passes.
+#include "cpu/integrator/batch.h"
+#include "cpu/integrator/scratch.h"
+#include "luch/bsdf/bsdf.h"
+#include "luch/shade/uv.h"
+
+namespace luch::cpu {
+namespace {
+
+float smooth_step(float from, float to, float x) {
+    float t = saturate_f((x - from) / (to - from));
+    return t * t * (3.0f - 2.0f * t);
+}
+
+}  // namespace
+
+// Limits a contribution; false (and counted) when it is not finite: such light never enters.
+bool Batch::admit(Color& c, u32 bounce) {
+    if (!finite_v(c)) {
+        counts_.bad_samples++;
+        return false;
+    }
+    c = clamp_contribution(c, bounce > 0 ? scene_.limits.clamp_indirect : scene_.limits.clamp_direct);
+    return true;
+}
+
+void Batch::add_to_light_passes(u32 pixel, Color c, Color diffuse, Color glossy, bool direct) {
+    const FilmLayout& layout = writer_.film.layout;
+    Color rest = make_vec3(1.0f) - diffuse - glossy;
+    film_add(writer_, pixel, direct ? layout.diffuse_direct : layout.diffuse_indirect, c * diffuse);
+    film_add(writer_, pixel, direct ? layout.glossy_direct : layout.glossy_indirect, c * glossy);
+    film_add(writer_, pixel, direct ? layout.transmission_direct : layout.transmission_indirect, c * rest);
+}
+
+// Light that a path found by itself: an emitter, a lamp or the world. own_pass: the pass that shows it
+// when it is seen directly.
+void Batch::add_emission(const PathState& path, Color radiance, u32 own_pass, u32 lightgroup) {
+    Color c = path.throughput * radiance;
+    if (is_zero(c) || !admit(c, path.bounce > 1 ? 1 : 0)) return;
+    film_add_combined(writer_, path.pixel, false, c);
+    if (!writer_.film.layout.any_light_pass && !(path.flags & PATH_FEATURES)) return;
+    if (lightgroup) film_add_lightgroup(writer_, path.pixel, lightgroup - 1, c);
+    if (path.flags & PATH_FEATURES) {
+        film_add(writer_, path.pixel, writer_.film.layout.denoising_albedo, path.feature_throughput * radiance);
+    }
+    if (!(path.flags & PATH_PASS_CHOSEN)) {
+        film_add(writer_, path.pixel, own_pass, c);
+    } else {
+        add_to_light_passes(path.pixel, c, path.pass_diffuse, path.pass_glossy, path.bounce == 1);
+    }
+}
+
+// The world behind a transparent film: it shows in the Environment pass alone.
+void Batch::add_environment_only(const PathState& path, Color radiance) {
+    Color c = path.throughput * radiance;
+    if (!is_zero(c) && admit(c, 0)) film_add(writer_, path.pixel, writer_.film.layout.environment, c);
+}
+
+void Batch::add_direct(const PathState& path, const ShadowRay& shadow, Color transmittance) {
+    Color c = shadow.contribution * transmittance;
+    if (!admit(c, shadow.bounce)) return;
+    if (shadow.for_ao) {
+        film_add(writer_, path.pixel, writer_.film.layout.ambient_occlusion, c);
+        return;
+    }
+    film_add_combined(writer_, path.pixel, false, c);
+    if (!writer_.film.layout.any_light_pass) return;
+    if (shadow.lightgroup) film_add_lightgroup(writer_, path.pixel, shadow.lightgroup - 1, c);
+    add_to_light_passes(path.pixel, c, shadow.pass_diffuse, shadow.pass_glossy, shadow.bounce == 0);
+}
+
+// Light that goes on to a transparent background or into a holdout: 1 - alpha.
+void Batch::add_alpha_hole(const PathState& path, float transparent) {
+    film_add_transparency(writer_, path.pixel, transparent);
+}
+
+void Batch::write_aovs(const PathState& path, const ClosureSet& set, const float* aovs) {
+    if (!(path.flags & PATH_THROUGH_FILM)) return;
+    float weight = average(path.throughput * (make_vec3(1.0f) - set.transparent));
+    for (u32 i = 0; i < writer_.film.layout.aov_count; i++) {
+        const float* value = aovs + size_t(i) * 4;
+        // A value AOV writes its one float; what lies beside it is never read.
+        film_add_aov_color(writer_, path.pixel, i, Color{value[0], value[1], value[2]} * weight, weight);
+    }
+}
+
+void Batch::write_data_passes(PathState& path, const ShadePoints& points, int lane, const ClosureSet& set,
+                              u32 material) {
+    if (!(path.flags & PATH_THROUGH_FILM)) return;
+    const FilmLayout& layout = writer_.film.layout;
+    float alpha = 1.0f - average(set.transparent);
+    Vec3 p = lane_position(points, lane);
+    if (!(path.flags & PATH_DATA_DONE)) {
+        if (path.sample == 0) write_first_sample(path.pixel, p, points.instance[lane], material);
+        if (alpha >= scene_.limits.alpha_threshold) {
+            path.flags |= PATH_DATA_DONE;
+            film_add(writer_, path.pixel, layout.normal, shading_normal(set, lane_normal(points, lane)));
+            if (layout.uv != NONE) film_add(writer_, path.pixel, layout.uv, surface_uv(scene_.view, points, lane));
+        }
+    }
+    if (layout.diffuse_color != NONE || layout.glossy_color != NONE || layout.transmission_color != NONE) {
+        BsdfValue albedo = closure_albedo(set, lane_to_viewer(points, lane));
+        film_add(writer_, path.pixel, layout.diffuse_color, albedo.diffuse * path.throughput);
+        film_add(writer_, path.pixel, layout.glossy_color, albedo.glossy * path.throughput);
+        film_add(writer_, path.pixel, layout.transmission_color, albedo.transmission * path.throughput);
+    }
+    if (layout.mist != NONE) {
+        float mist = saturate_f((camera_distance(p) - scene_.mist_start) * scene_.mist_inverse_depth);
+        if (scene_.mist_exponent != 1.0f) mist = pow_f(mist, scene_.mist_exponent);
+        film_add(writer_, path.pixel, layout.mist, (1.0f - mist) * average(path.throughput) * alpha);
+    }
+    if (layout.crypto_slots > 0) write_crypto(path, points.instance[lane], material, alpha);
+}
+
+// Depth, Position and the indices are those of a pixel's first sample: averages would lie between surfaces.
+void Batch::write_first_sample(u32 pixel, Vec3 p, u32 instance, u32 material) {
+    const ObjectView& object = scene_.view.objects[scene_.view.instances[instance].object];
+    const FilmLayout& layout = writer_.film.layout;
+    film_set(writer_, pixel, layout.depth, camera_depth(p));
+    film_set(writer_, pixel, layout.object_index, object.pass_index);
+    film_set(writer_, pixel, layout.material_index, scene_.view.materials[material].pass_index);
+    film_set_position(writer_, pixel, p);
+}
+
+void Batch::write_crypto(const PathState& path, u32 instance, u32 material, float alpha) {
+    float weight = average(path.throughput) * alpha;
+    const ObjectView& object = scene_.view.objects[scene_.view.instances[instance].object];
+    const FilmLayout& layout = writer_.film.layout;
+    film_add_crypto(writer_, path.pixel, layout.crypto_object, object.crypto_object, weight);
+    film_add_crypto(writer_, path.pixel, layout.crypto_material, scene_.view.materials[material].crypto, weight);
+    film_add_crypto(writer_, path.pixel, layout.crypto_asset, object.crypto_asset, weight);
+}
+
+float Batch::camera_depth(Vec3 p) const {
+    if (scene_.camera.kind == CameraKind::EQUIRECTANGULAR) return camera_distance(p);
+    return transform_point(scene_.camera.to_camera, p).z;
+}
+
+float Batch::camera_distance(Vec3 p) const { return length(transform_point(scene_.camera.to_camera, p)); }
+
+// Albedo and normal for a denoiser; sharp reflections pass the task on to what they show.
+void Batch::write_features(PathState& path, const ClosureSet& set) {
+    Vec3 normal = make_vec3(0.0f);
+    Color rough_albedo = make_vec3(0.0f), sharp_albedo = make_vec3(0.0f);
+    float sum = 0.0f, rough_sum = 0.0f;
+    for (int i = 0; i < set.count; i++) {
+        const Lobe& lobe = set.lobes[i];
+        Color albedo = lobe.weight;
+        float weight = average(albedo);
+        float roughness = is_diffuse(lobe.type) ? 1.0f : sqrt_f(lobe.alpha_x * lobe.alpha_y);
+        float rough = smooth_step(0.0f, 0.15f, roughness);
+        normal += lobe.normal * weight;
+        rough_albedo += albedo * rough;
+        sharp_albedo += albedo * (1.0f - rough);
+        sum += weight;
+        rough_sum += weight * rough;
+    }
+    float write = sum > 0.0f ? smooth_step(0.0f, 0.5f, rough_sum / sum) : 0.0f;
+    if (write > 0.0f) {
+        const FilmLayout& layout = writer_.film.layout;
+        film_add(writer_, path.pixel, layout.denoising_normal, normal * (write * average(path.feature_throughput) / sum));
+        film_add(writer_, path.pixel, layout.denoising_albedo, path.feature_throughput * rough_albedo * write);
+    }
+    float through = average(set.transparent);
+    if (!(through + sum > 0.0f)) {
+        path.flags &= ~u32(PATH_FEATURES);
+        return;
+    }
+    // What is left goes on with the path: through transparency whole, through sharp lobes by their colour.
+    path.feature_throughput *= (sharp_albedo * (1.0f - write) + make_vec3(through)) * (1.0f / (sum + through));
+    if (max_component(path.feature_throughput) < 1e-3f) path.flags &= ~u32(PATH_FEATURES);
+}
+
+}  // namespace luch::cpu

@@ -1,0 +1,188 @@
+#include "cpu/integrator/renderer.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "cpu/shade/interpreter.h"
+#include "luch/shade/surface_setup.h"
+
+namespace luch::cpu {
+namespace {
+
+// A tile of 16 x 16 pixels with 8 samples each fills a batch; neighbouring rays meet the same nodes.
+constexpr int TILE_SIZE = 16;
+constexpr u32 SAMPLES_PER_BATCH = BATCH_PATHS / (TILE_SIZE * TILE_SIZE);
+
+double seconds_now() {
+    using namespace std::chrono;
+    return duration<double>(steady_clock::now().time_since_epoch()).count();
+}
+
+u32 ceil_log2(u32 n) {
+    u32 bits = 0;
+    while (bits < 31 && (1u << bits) < n) bits++;
+    return bits;
+}
+
+// One lane, evaluated for its emission; registers are the caller's.
+Color evaluate_emission(const SceneView& view, const Program& program, const ShadePoints& points) {
+    std::vector<float> registers(register_floats(program) + 16);
+    float* aligned = reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(registers.data()) + 63) & ~uintptr_t(63));
+    std::vector<ClosureSet> sets(1);
+    run_program(view, program, points, sets.data(), aligned);
+    return sets[0].emission;
+}
+
+}  // namespace
+
+Renderer::Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input)
+    : input_(input), store_(std::move(store)), pool_(input.threads), film_(input.film) {
+    scene_.view = store_->finish();
+    double start = seconds_now();
+    accel_ = Accel::build(scene_.view, store_->transparency_flags(), pool_, input_.accel_kind);
+    stats_.accel_seconds = seconds_now() - start;
+    stats_.accel = accel_->stats();
+    stats_.scene_bytes = store_->bytes();
+    scene_.accel = accel_.get();
+    scene_.camera = input_.camera;
+    scene_.filter = input_.filter;
+    scene_.limits = input_.limits;
+    scene_.seed = input_.seed;
+    scene_.log2_samples = ceil_log2(input_.samples);
+    scene_.mist_start = input_.mist_start;
+    scene_.mist_inverse_depth = input_.mist_depth > 0.0f ? 1.0f / input_.mist_depth : 0.0f;
+    scene_.mist_exponent = input_.mist_exponent;
+    std::copy(input_.origin, input_.origin + 3, scene_.origin);
+    find_constants();
+    start = seconds_now();
+    build_lights();
+    stats_.lights_seconds = seconds_now() - start;
+    for (unsigned worker = 0; worker < pool_.size(); worker++) {
+        batches_.push_back(std::make_unique<Batch>(scene_, film_.view()));
+    }
+}
+
+Renderer::~Renderer() = default;
+
+// What does not change from point to point is evaluated here, once.
+void Renderer::find_constants() {
+    const SceneView& view = scene_.view;
+    size_t registers = view.world_program.register_count;
+    ShadePoints points{};
+    points.count = 1;
+    LaneInputs in{};
+    in.to_viewer = {0.0f, 0.0f, 1.0f};
+    in.instance = in.prim = NONE;
+    in.flags = PATH_EMISSION_ONLY;
+    setup_free_lane(in, {0.0f, 0.0f, 1.0f}, points, 0);
+    for (u32 m = 0; m < view.material_count; m++) {
+        const Program& program = view.materials[m].program;
+        registers = std::max(registers, size_t(program.register_count));
+        ConstantEmission emission;
+        emission.constant = !(program.flags & PROGRAM_EMISSION) || (program.flags & PROGRAM_CONSTANT_EMISSION);
+        if (program.flags & PROGRAM_CONSTANT_EMISSION) emission.radiance = evaluate_emission(view, program, points);
+        scene_.material_emission.push_back(emission);
+    }
+    for (const LampInput& lamp : input_.lamps) {
+        if (lamp.has_program) registers = std::max(registers, size_t(lamp.program.register_count));
+    }
+    scene_.max_registers = registers;
+    scene_.has_world = input_.world.present;
+    scene_.world_visibility = input_.world.visibility;
+    scene_.world_lightgroup = input_.world.lightgroup;
+    if (input_.world.present && (view.world_program.flags & PROGRAM_CONSTANT_EMISSION)) {
+        scene_.world_emission = {true, evaluate_emission(view, view.world_program, points)};
+    }
+}
+
+std::vector<float> Renderer::world_map(int width, int height) {
+    std::vector<float> map(size_t(width) * size_t(height) * 3);
+    const SceneView& view = scene_.view;
+    pool_.parallel_for(size_t(height), 4, [&](size_t begin, size_t end, unsigned) {
+        std::vector<float> registers(register_floats(view.world_program) + 16);
+        float* aligned =
+            reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(registers.data()) + 63) & ~uintptr_t(63));
+        auto points = std::make_unique<ShadePoints>();
+        std::vector<ClosureSet> sets(SHADE_LANES);
+        for (size_t y = begin; y < end; y++) {
+            for (int x0 = 0; x0 < width; x0 += SHADE_LANES) {
+                points->count = std::min(SHADE_LANES, width - x0);
+                for (int lane = 0; lane < points->count; lane++) {
+                    LaneInputs in{};
+                    in.point = world_map_direction(width, height, x0 + lane, int(y));
+                    in.to_viewer = -in.point;
+                    in.instance = in.prim = NONE;
+                    in.flags = PATH_EMISSION_ONLY | PATH_DIFFUSE;
+                    setup_free_lane(in, -in.point, *points, lane);
+                }
+                run_program(view, view.world_program, *points, sets.data(), aligned);
+                for (int lane = 0; lane < points->count; lane++) {
+                    float* out = map.data() + (y * size_t(width) + size_t(x0 + lane)) * 3;
+                    out[0] = sets[lane].emission.x, out[1] = sets[lane].emission.y, out[2] = sets[lane].emission.z;
+                }
+            }
+        }
+    });
+    return map;
+}
+
+void Renderer::build_lights() {
+    WorldInput world = input_.world;
+    std::vector<float> map;
+    world.constant = scene_.world_emission.constant;
+    world.constant_radiance = scene_.world_emission.radiance;
+    if (world.present && !world.constant && input_.world_map_width > 0) {
+        world.map_width = input_.world_map_width;
+        world.map_height = input_.world_map_width / 2;
+        map = world_map(world.map_width, world.map_height);
+        world.map_rgb = map.data();
+    }
+    lights_.build(scene_.view, input_.lamps, world, input_.material_emission_estimate, input_.light_tree, pool_);
+    store_->view().lights = scene_.view.lights = &lights_.view();
+    const LightsView& lights = lights_.view();
+    scene_.has_lights = lights.emitter_count > 0 || lights.sun_count > 0 || lights.world.present;
+    scene_.has_visible_lamps = lights.box_count > 0;
+}
+
+bool Renderer::render(u32 first, u32 count) {
+    const FilmSpec& film = input_.film;
+    int width = int(film.width), height = int(film.height);
+    int columns = (width + TILE_SIZE - 1) / TILE_SIZE, rows = (height + TILE_SIZE - 1) / TILE_SIZE;
+    tiles_total_ = u64(columns) * u64(rows);
+    tiles_done_.store(0);
+    double start = seconds_now();
+    pool_.parallel_for(size_t(tiles_total_), 1, [&](size_t begin, size_t end, unsigned worker) {
+        for (size_t t = begin; t < end; t++) {
+            PixelBlock block;
+            int x = int(t % size_t(columns)) * TILE_SIZE, y = int(t / size_t(columns)) * TILE_SIZE;
+            block.x0 = int(film.x0) + x, block.y0 = int(film.y0) + y;
+            block.width = std::min(TILE_SIZE, width - x), block.height = std::min(TILE_SIZE, height - y);
+            for (u32 done = 0; done < count; done += block.sample_count) {
+                if (cancelled_.load(std::memory_order_relaxed)) return;
+                block.first_sample = first + done;
+                block.sample_count = std::min(SAMPLES_PER_BATCH, count - done);
+                batches_[worker]->trace(block);
+            }
+            tiles_done_.fetch_add(1, std::memory_order_relaxed);
+        }
+    });
+    stats_.trace_seconds += seconds_now() - start;
+    return !cancelled_.load();
+}
+
+double Renderer::step_progress() const { return double(tiles_done_.load()) / double(std::max<u64>(tiles_total_, 1)); }
+
+RenderStats Renderer::stats() const {
+    RenderStats stats = stats_;
+    for (const auto& batch : batches_) {
+        const BatchCounts c = batch->counts();
+        stats.counts.paths += c.paths;
+        stats.counts.rays += c.rays;
+        stats.counts.shadow_rays += c.shadow_rays;
+        stats.counts.surface_points += c.surface_points;
+        stats.counts.bad_samples += c.bad_samples;
+    }
+    return stats;
+}
+
+}  // namespace luch::cpu

@@ -1,0 +1,77 @@
+// Renders a prepared scene, step by step: a step is a range of samples for every pixel of the frame.
+#pragma once
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cpu/integrator/batch.h"
+#include "cpu/film.h"
+#include "cpu/integrator/render_scene.h"
+#include "cpu/lights.h"
+#include "cpu/scene_store.h"
+#include "cpu/thread_pool.h"
+
+namespace luch::cpu {
+
+// What the renderer is made from, beside the SceneStore.
+struct RenderInput {
+    std::vector<LampInput> lamps;
+    WorldInput world;
+    int world_map_width = 0;  // of the importance map, 0: no map
+    std::vector<Color> material_emission_estimate;
+    bool light_tree = true;
+    AccelKind accel_kind = AccelKind::BVH;
+    CameraView camera{};
+    PixelFilter filter{};
+    PathLimits limits{};
+    FilmSpec film;
+    u32 seed = 0, samples = 1;
+    unsigned threads = 0;
+    float mist_start = 0.0f, mist_depth = 25.0f, mist_exponent = 2.0f;
+    double origin[3] = {0.0, 0.0, 0.0};
+};
+
+struct RenderStats {
+    BatchCounts counts;
+    AccelStats accel;
+    double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0;
+    u64 scene_bytes = 0;
+};
+
+class Renderer {
+  public:
+    Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input);
+    ~Renderer();
+
+    // Traces samples [first, first + count) of every pixel into the film. Returns false when cancelled; the
+    // film then holds what was traced, pixel by pixel with its own sample count.
+    bool render(u32 first, u32 count);
+
+    // From any thread: makes render() return within one batch's time.
+    void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+    // Share of the running step that is done, 0..1.
+    double step_progress() const;
+    RenderStats stats() const;
+    const Film& film() const { return film_; }
+
+  private:
+    void find_constants();
+    void build_lights();
+    std::vector<float> world_map(int width, int height);
+
+    RenderInput input_;
+    std::unique_ptr<SceneStore> store_;
+    ThreadPool pool_;
+    std::unique_ptr<Accel> accel_;
+    LightStore lights_;
+    RenderScene scene_;
+    Film film_;
+    std::vector<std::unique_ptr<Batch>> batches_;
+    std::atomic<bool> cancelled_{false};
+    std::atomic<u64> tiles_done_{0};
+    u64 tiles_total_ = 1;
+    RenderStats stats_;
+};
+
+}  // namespace luch::cpu

@@ -1,0 +1,106 @@
+// Owns the arrays behind a SceneView. Filled mesh by mesh, program by program; then `finish`.
+#pragma once
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "cpu/shade/link.h"
+#include "luch/shade/scene_view.h"
+
+namespace luch::cpu {
+
+struct AttributeInput {
+    std::string name;
+    const float* data;
+    size_t rows;
+    u32 channels;
+    Domain domain;
+};
+
+struct MeshInput {
+    std::string name;
+    const float* positions;
+    size_t vertex_count;
+    const u32* triangles;
+    const u16* material_slots;
+    size_t triangle_count;
+    const float* normals;  // null: flat
+    Domain normals_domain;
+    std::vector<AttributeInput> attributes;
+    std::string uv_active, color_active;
+    Vec3 texture_location, texture_size;
+};
+
+struct ObjectInput {
+    u32 mesh;
+    std::vector<u32> materials;
+    float pass_index;
+    float color[4];
+    u32 visibility;
+    bool holdout, shadow_catcher;
+    u32 lightgroup;
+    float crypto_object, crypto_asset;
+};
+
+struct InstanceInput {
+    u32 object;
+    double matrix[12];  // already relative to the scene's origin
+    float random;
+    Vec3 generated;
+    Vec2 uv;
+};
+
+class SceneStore {
+   public:
+    SceneStore();
+
+    // Throws std::invalid_argument, naming the mesh, for an index out of range or sizes that do not agree.
+    void add_mesh(const MeshInput& input);
+    u32 add_object(const ObjectInput& input);
+    // False when the matrix is not finite or cannot be inverted: such an instance is not drawn.
+    bool add_instance(const InstanceInput& input);
+    // The source's maps must already hold the scene's numbers (attribute_id for attributes).
+    Program add_program(const ProgramSource& source) { return programs_.add(source); }
+    u32 add_material(const MaterialView& material);
+    void add_image(const ImageView& image, std::vector<u8> pixels);
+    void set_world_program(const Program& program) { view_.world_program = program; }
+    void set_camera(const Affine& world_to_camera, Vec3 position);
+
+    // Points the view at the arrays; call after the last add_.
+    const SceneView& finish();
+    SceneView& view() { return view_; }
+    const SceneView& view() const { return view_; }
+
+    // Per mesh, per triangle: bit 0 set when some object that uses the mesh has a material there that may be
+    // transparent for shadow rays. An empty inner vector: no triangle of that mesh.
+    std::vector<std::vector<u8>> transparency_flags() const;
+
+    size_t bytes() const;
+    u32 attribute_id(const std::string& name);
+
+   private:
+    void resolve_attributes();
+
+    struct NamedAttribute {
+        u32 mesh, id;
+        AttributeView view;
+    };
+    SceneView view_{};
+    LinkedPrograms programs_;
+    std::vector<float> positions_, normals_, attribute_data_;
+    std::vector<u32> triangles_, material_table_;
+    std::vector<u16> material_slots_;
+    std::vector<AttributeView> attributes_;
+    std::vector<NamedAttribute> named_attributes_;
+    std::vector<MeshView> meshes_;
+    std::vector<ObjectView> objects_;
+    std::vector<ObjectInput> object_inputs_;
+    std::vector<u32> object_first_material_;
+    std::vector<InstanceView> instances_;
+    std::vector<MaterialView> materials_;
+    std::vector<ImageView> images_;
+    std::vector<std::vector<u8>> pixels_;
+    std::unordered_map<std::string, u32> attribute_ids_;
+};
+
+}  // namespace luch::cpu

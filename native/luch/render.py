@@ -1,0 +1,146 @@
+"""Renders a scene: the loop over samples, progress, time left, cancelling.
+
+>>> result = render(scene, progress=lambda p: print(p.samples) or True)   # doctest: +SKIP
+>>> result.passes["Combined"].shape                                       # doctest: +SKIP
+(1080, 1920, 4)
+"""
+
+from __future__ import annotations
+
+import resource
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from luch._native import core
+from luch.scene import F32, Scene
+
+# A step is watched this often: what a cancel waits for at most, beside one batch of paths.
+WATCH_SECONDS = 0.1
+# Steps grow until one takes about this long; longer steps show the picture too seldom.
+STEP_SECONDS = 4.0
+
+
+@dataclass
+class Progress:
+    """What the caller is told while the picture grows. ``passes`` is only to be called from the callback."""
+
+    samples: int  # finished, of every pixel
+    total_samples: int
+    fraction: float  # of the whole work, 0..1
+    seconds: float  # since rendering began
+    remaining_seconds: float  # estimate; inf while nothing is known
+    memory_bytes: int  # of the process, at its peak
+    new_picture: bool  # a step has ended since the last call: passes() shows more than before
+    passes: Callable[[], dict[str, F32]]
+
+
+@dataclass
+class Result:
+    """The finished picture: pass name -> float32 (H, W, C), bottom row first; and what it took."""
+
+    passes: dict[str, F32]
+    stats: dict[str, Any] = field(default_factory=dict)
+    cancelled: bool = False
+
+
+def peak_memory_bytes() -> int:
+    """Most memory that this process has held."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+class _Step(threading.Thread):
+    """One call of the native renderer, so that the caller's thread can watch and cancel."""
+
+    def __init__(self, renderer: Any, first: int, count: int) -> None:
+        super().__init__(daemon=True)
+        self._renderer, self._first, self._count = renderer, first, count
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            self._renderer.render(self._first, self._count)
+        except BaseException as error:  # handed to the caller's thread, which raises it
+            self.error = error
+
+
+def _next_count(done: int, total: int, seconds: float) -> int:
+    """Samples of the next step: doubling, bounded by what STEP_SECONDS allow and by what is left."""
+    if done == 0:
+        return 1
+    by_time = max(1, int(STEP_SECONDS * done / max(seconds, 1e-6)))
+    return max(1, min(done, by_time, total - done))
+
+
+def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) -> Result:
+    """Renders ``scene`` as its settings say, until its samples or its time limit are reached.
+
+    progress is called about ten times a second and at the end of every step; returning False cancels,
+    and the film so far is returned (``Result.cancelled``). Raises ValueError for a scene that does not
+    fit together, naming the object.
+    """
+    start = time.perf_counter()
+    renderer = core.render.Renderer(scene)
+    prepared = time.perf_counter()
+    settings = scene.settings
+    total = max(1, settings.samples)
+    done, cancelled = 0, False
+
+    def tell(first: int, count: int, new_picture: bool) -> bool:
+        if progress is None:
+            return True
+        seconds = time.perf_counter() - prepared
+        work = first + count * (0.0 if new_picture else renderer.step_progress())
+        fraction = work / total
+        if settings.time_limit > 0.0:
+            fraction = max(fraction, seconds / settings.time_limit)
+        remaining = seconds * (1.0 - fraction) / fraction if fraction > 0.0 else float("inf")
+        return progress(
+            Progress(
+                first, total, min(fraction, 1.0), seconds, max(remaining, 0.0), peak_memory_bytes(), new_picture,
+                renderer.passes,
+            )
+        )
+
+    def out_of_time() -> bool:
+        return settings.time_limit > 0.0 and time.perf_counter() - prepared >= settings.time_limit
+
+    timed_out = False
+    while done < total and not cancelled and not timed_out:
+        count = _next_count(done, total, time.perf_counter() - prepared)
+        step = _Step(renderer, done, count)
+        step.start()
+        while step.is_alive():
+            step.join(WATCH_SECONDS)
+            if not step.is_alive() or cancelled or timed_out:
+                continue
+            timed_out = out_of_time() and done > 0
+            cancelled = not tell(done, count, False)
+            if cancelled or timed_out:
+                renderer.cancel()
+        if step.error is not None:
+            raise step.error
+        if not cancelled and not timed_out:
+            done += count
+            timed_out = out_of_time()
+            cancelled = not tell(done, 0, True)
+    stats = dict(renderer.stats())
+    stats.update(
+        samples=done,
+        samples_asked=total,
+        prepare_seconds=prepared - start,
+        render_seconds=time.perf_counter() - prepared,
+        seed=settings.seed,
+        device="CPU",
+        instruction_set=core.__name__.rsplit("_", 1)[-1],
+        peak_memory_bytes=peak_memory_bytes(),
+        cancelled=cancelled,
+        stopped_by="cancel" if cancelled else "time" if timed_out else "samples",
+        warnings=list(scene.warnings),
+    )
+    passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
+    return Result(passes, stats, cancelled)
