@@ -29,6 +29,7 @@ MAY_INCLUDE = {
 }
 # A header between folders is a contract: plain data that both sides need. (from folder, header)
 CONTRACTS = {
+    ("geometry", "luch/shade/scene_view.h"),
     ("bsdf", "luch/shade/scene_view.h"),
     ("light", "luch/shade/scene_view.h"),
     ("light", "luch/bsdf/closure.h"),

@@ -54,6 +54,9 @@ class LUCH_OT_follow_cycles(bpy.types.Operator):
 CLASSES = (LUCH_OT_export_scene, LUCH_OT_follow_cycles)
 
 
+EXPORT_MENU: Any = bpy.types.TOPBAR_MT_file_export
+
+
 def draw_in_export_menu(menu: Any, context: Any) -> None:
     """File > Export."""
     menu.layout.operator(LUCH_OT_export_scene.bl_idname, text="Luch Scene (.luch)")
@@ -62,10 +65,10 @@ def draw_in_export_menu(menu: Any, context: Any) -> None:
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.TOPBAR_MT_file_export.append(draw_in_export_menu)
+    EXPORT_MENU.append(draw_in_export_menu)
 
 
 def unregister() -> None:
-    bpy.types.TOPBAR_MT_file_export.remove(draw_in_export_menu)
+    EXPORT_MENU.remove(draw_in_export_menu)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -16,17 +16,17 @@ from buildtools.inside import session
 def main(options: dict[str, Any]) -> int:
     from luch.scenefile import write_scene
 
-    from addon.export.scene import export_scene
+    from addon.engine import capture_scene
 
     scene = session.open_file(options["file"])
     if options["frame"] is not None:
         scene.frame_set(options["frame"])
     started = time.perf_counter()
-    exported = export_scene(bpy.context.evaluated_depsgraph_get())
+    exported = capture_scene(scene, bpy.context.view_layer)
     seconds = time.perf_counter() - started
     path = Path(options["output"])
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_scene(exported, path)
+    write_scene(exported, str(path))
     print(f"exported in {seconds:.2f} s: {path} ({path.stat().st_size / 1e6:.1f} MB)")
     for warning in exported.warnings:
         print(f"  {warning}")

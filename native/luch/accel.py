@@ -69,7 +69,7 @@ class Accel:
 
     def any(self, rays: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Whether each ray hits anything. rays: (N, 8) float32; returns (N,) bool."""
-        return self.blocked(rays) != 0
+        return np.asarray(self.blocked(rays) != 0, np.bool_)
 
     @property
     def stats(self) -> dict[str, float]:

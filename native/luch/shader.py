@@ -318,14 +318,14 @@ class ProgramBuilder:
             read = [register[value] for value in node.inputs]
             free.extend(sorted({register[value] for value in ending}, reverse=True))
             written, unused = [], []
-            for value in range(node.first, node.first + node.op.outputs):
+            for output in range(node.first, node.first + node.op.outputs):
                 if not free:
                     free.append(count)
                     count += 1
-                register[value] = free.pop()
-                written.append(register[value])
-                if value not in last_use:
-                    unused.append(register[value])
+                register[output] = free.pop()
+                written.append(register[output])
+                if output not in last_use:
+                    unused.append(register[output])
             free.extend(unused)
             code.extend([node.op.code, len(node.params), *written, *read, *node.params])
         return np.array(code, np.uint32), constants, count

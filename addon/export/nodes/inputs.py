@@ -6,6 +6,8 @@ unlinked; all of them heed the bump stencil (Compiler.offset_params).
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_UV, Vector, float_word
@@ -66,7 +68,8 @@ def texture_coordinate(c: Compiler, node: bpy.types.Node) -> Outputs:
     """Texture Coordinate, of the object itself, of another one, or of the instancer."""
     b, corner = c.builder, c.offset_params()
     if node.object is not None:
-        to_object = np.linalg.inv(np.array(c.context.object_matrix(node.object), np.float64))[:3]
+        matrix: Any = c.context.object_matrix(node.object)
+        to_object = np.linalg.inv(np.array(matrix, np.float64))[:3]
         object_space = b.op3("POINT_OTHER_OBJECT", (), (*corner, *(float_word(x) for x in to_object.ravel())))
     else:
         object_space = b.op3("POINT_OBJECT", (), corner)
