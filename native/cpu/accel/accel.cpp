@@ -205,7 +205,7 @@ void TwoLevel::count() {
 
 NodeRay TwoLevel::top_ray(Vec3 origin, Vec3 direction, float t_min) const {
     float error = top_error_scale_ * (3.0f * max_component(abs_v(origin)) + top_size_);
-    return NodeRay(make_box_ray(make_triangle_ray(origin, direction), direction, root_, error), t_min);
+    return NodeRay(make_box_ray(origin, direction, root_, error), t_min);
 }
 
 void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) const {

@@ -65,8 +65,8 @@ HugeArray<PrimBox> gather_boxes(const Group& group, const Gather& gather, Thread
             while (member != last && ref >= member[1].first_ref) ++member;
             Corners3 c;
             if (!gather.read(u32(ref), *member, &c)) continue;
-            Vec3 lo = min_v(min_v(c.p[0], c.p[1]), c.p[2]), hi = max_v(max_v(c.p[0], c.p[1]), c.p[2]);
-            boxes[next++] = {{-lo.x, -lo.y, -lo.z}, u32(ref), {hi.x, hi.y, hi.z}, 0};
+            Box b = triangle_box(c.p[0], c.p[1], c.p[2]);
+            boxes[next++] = {{-b.lo.x, -b.lo.y, -b.lo.z}, u32(ref), {b.hi.x, b.hi.y, b.hi.z}, 0};
         }
         filled[begin / GATHER_CHUNK] = next - begin;
     });

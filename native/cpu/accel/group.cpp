@@ -15,7 +15,7 @@ struct Rays {
     BlockRay block;
     Rays(const Group& group, Vec3 origin, Vec3 direction, float t_min)
         : triangle(make_triangle_ray(origin, direction)),
-          node(make_box_ray(triangle, direction, group.root), t_min),
+          node(make_box_ray(origin, direction, group.root), t_min),
           block(triangle, t_min) {}
 };
 

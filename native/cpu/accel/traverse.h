@@ -1,5 +1,7 @@
 // Walking the eight-wide tree with one ray: closest hit and any hit, over a leaf test given as a callable.
 #pragma once
+#include <utility>
+
 #include "cpu/accel/bvh8.h"
 #include "cpu/accel/simd.h"
 #include "luch/geometry/box.h"
@@ -104,18 +106,66 @@ LUCH_FN u32 intersect_block(const Block4& block, const BlockRay& r, float t_max,
     return candidates & ~outside & mask_lt(splat<f4>(r.t_min), t) & mask_le(t, splat<f4>(t_max));
 }
 
-// Entry distances are never negative, so as integers they sort as they do as floats.
-struct StackEntry {
-    u32 child;
-    float distance;
-};
+LUCH_FN u64 pack(float distance, u32 child) { return u64(float_bits(distance)) << 32 | child; }
+LUCH_FN float distance_of(u64 entry) { return bits_float(u32(entry >> 32)); }
+// Splits the lanes of a mask into branches, one per lane, each with its lane as a constant. A predicted branch
+// knows the address of the next node before the box test is done; index arithmetic on the mask would wait for
+// it (measured: 1.2 to 1.5 times the primary rays). `act` is forced inline; lanes go upwards.
+template <u32 LANE = 0, class Act>
+LUCH_FN void for_first_lane(u32 mask, Act&& act) {
+    if constexpr (LANE < 7) {
+        if (!(mask & (1u << LANE))) return for_first_lane<LANE + 1>(mask, act);
+    }
+    act(LANE);
+}
+template <u32 LANE = 1, class Act>
+LUCH_FN void for_lanes(u32 mask, Act&& act) {
+    if constexpr (LANE < 8) {
+        if (mask & (1u << LANE)) act(LANE);
+        for_lanes<LANE + 1>(mask, act);
+    }
+}
+// Keeps the compiler from turning the branch around it into arithmetic.
+LUCH_FN void keep_branch(u32& value) { asm volatile("" : "+r"(value)); }
+
+// Pushes all children of mask but the nearest, farthest first; returns the nearest.
+LUCH_FN u32 push_children(const Node8& node, u32 mask, f8 entry, u64** top_of_stack) {
+    alignas(32) float distance[8];
+    *reinterpret_cast<f8*>(distance) = entry;
+    u32 nearest = 0;
+    float nearest_distance = 0.0f;
+    for_first_lane(mask, [&](u32 lane) {
+        nearest = node.child[lane];
+        nearest_distance = distance[lane];
+        keep_branch(nearest);
+    });
+    mask &= mask - 1;
+    if (!mask) return nearest;
+    u64* own = *top_of_stack;
+    u64* top = own;
+    for_lanes(mask, [&](u32 lane) {
+        u32 farther = node.child[lane];
+        float farther_distance = distance[lane];
+        if (farther_distance < nearest_distance) {
+            std::swap(nearest, farther);
+            std::swap(nearest_distance, farther_distance);
+            keep_branch(nearest);
+        }
+        u64 entered = pack(farther_distance, farther);
+        u64* place = top++;  // this node's entries stay sorted, nearest on top
+        for (; place > own && place[-1] < entered; --place) *place = place[-1];
+        *place = entered;
+    });
+    *top_of_stack = top;
+    return nearest;
+}
 
 // Calls leaf(first item, items) nearest leaves first; leaf lowers *t_max when it finds a hit. Boxes entered
 // at exactly t_max are still visited: a hit there may have the smaller id.
 template <class Leaf>
 LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* t_max, Leaf&& leaf) {
-    StackEntry stack[STACK_SIZE];
-    StackEntry* top = stack;
+    u64 stack[STACK_SIZE];  // entry distance, child: never negative, so distances sort as integers do
+    u64* top = stack;
     u32 current = 0;
     for (;;) {
         while (!(current & LEAF)) {
@@ -123,32 +173,15 @@ LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* 
             f8 entry;
             u32 mask = intersect_node(node, ray, *t_max, &entry);
             if (!mask) goto pop;
-            alignas(32) float distance[8];
-            *reinterpret_cast<f8*>(distance) = entry;
-            u32 i = u32(__builtin_ctz(mask));
-            StackEntry nearest = {node.child[i], distance[i]};
-            StackEntry* own = top;
-            for (mask &= mask - 1; mask; mask &= mask - 1) {
-                i = u32(__builtin_ctz(mask));
-                StackEntry other = {node.child[i], distance[i]};
-                if (other.distance < nearest.distance) {
-                    StackEntry swapped = nearest;
-                    nearest = other;
-                    other = swapped;
-                }
-                StackEntry* place = top++;  // this node's entries stay sorted, nearest on top
-                for (; place > own && place[-1].distance < other.distance; --place) *place = place[-1];
-                *place = other;
-            }
-            current = nearest.child;
+            current = push_children(node, mask, entry, &top);
         }
         leaf(current & LEAF_FIRST_MASK, ((current >> LEAF_COUNT_SHIFT) & (LEAF_MAX_ITEMS - 1)) + 1);
     pop:
         do {
             if (top == stack) return;
             --top;
-        } while (!(top->distance <= *t_max));
-        current = top->child;
+        } while (!(distance_of(*top) <= *t_max));
+        current = u32(*top);
     }
 }
 
@@ -164,7 +197,10 @@ LUCH_FN void visit_any(const Node8* nodes, const NodeRay& ray, float t_max, Leaf
             f8 entry;
             u32 mask = intersect_node(node, ray, t_max, &entry);
             if (!mask) goto pop;
-            current = node.child[__builtin_ctz(mask)];
+            for_first_lane(mask, [&](u32 lane) {
+                current = node.child[lane];
+                keep_branch(current);
+            });
             for (mask &= mask - 1; mask; mask &= mask - 1) *top++ = node.child[__builtin_ctz(mask)];
         }
         if (leaf(current & LEAF_FIRST_MASK, ((current >> LEAF_COUNT_SHIFT) & (LEAF_MAX_ITEMS - 1)) + 1)) return;

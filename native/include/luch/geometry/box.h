@@ -19,9 +19,13 @@ LUCH_FN void extend(Box& box, const Box& other) {
     box.lo = min_v(box.lo, other.lo);
     box.hi = max_v(box.hi, other.hi);
 }
-LUCH_FN float half_area(const Box& box) {
-    Vec3 d = box.hi - box.lo;
-    return d.x * d.y + d.y * d.z + d.z * d.x;
+
+// A triangle's box as the slab test needs it: math/bounds.h, 1.
+LUCH_FN Box triangle_box(Vec3 p0, Vec3 p1, Vec3 p2) {
+    Vec3 lo = min_v(min_v(p0, p1), p2), hi = max_v(max_v(p0, p1), p2);
+    float error = SHEAR_ERROR * max_component(hi - lo) + 1e-44f;  // denormal: above() cannot widen such numbers
+    return {{below(lo.x - error), below(lo.y - error), below(lo.z - error)},
+            {above(hi.x + error), above(hi.y + error), above(hi.z + error)}};
 }
 
 // Per axis: the slab interval is (near plane - near_origin) near_rdir .. (far plane - far_origin) far_rdir.
@@ -32,23 +36,25 @@ struct BoxRay {
 };
 
 // root: the box of all triangles that this ray may be tested with. extra: widening per axis (0 for none).
-LUCH_FN BoxRay make_box_ray(const TriangleRay& r, Vec3 direction, const Box& root, float extra = 0.0f) {
+LUCH_FN BoxRay make_box_ray(Vec3 origin, Vec3 direction, const Box& root, float extra = 0.0f) {
     BoxRay out;
-    Vec3 extent = max_v(abs_v(root.lo - r.origin), abs_v(root.hi - r.origin));
-    float extent_z = extent[r.kz];
+    float slope = SHEAR_ERROR * max_component(abs_v(direction));  // the cone's half width at t = 1
     for (int axis = 0; axis < 3; ++axis) {
-        float o = r.origin[axis], d = direction[axis];
-        float error = (axis == r.kz ? 0.0f : SHEAR_ERROR * (extent[axis] + extent_z)) + extra;
-        // Rounded outwards: o + error alone may round back to o.
-        float above = error > 0.0f ? next_up(o + error) : o;
-        float below = error > 0.0f ? next_down(o - error) : o;
+        float o = origin[axis], d = direction[axis], steep = abs_f(d);
+        float near_d = steep + slope, far_d = steep - slope;
+        float error = extra;
+        if (steep < 4.0f * slope) {  // as good as parallel to the planes: inside or outside all along the box
+            near_d = far_d = 0.0f;
+            Vec3 extent = max_v(abs_v(root.lo - origin), abs_v(root.hi - origin));
+            error += 6.0f * SHEAR_ERROR * max_component(extent);
+        }
         u32 negative = float_bits(d) >> 31;
-        float rdir = 1.0f / d;
+        float sign = negative ? -1.0f : 1.0f;
         out.negative[axis] = negative;
-        out.near_origin[axis] = negative ? below : above;
-        out.far_origin[axis] = negative ? above : below;
-        out.near_rdir[axis] = rdir * SLAB_DOWN;
-        out.far_rdir[axis] = rdir * SLAB_UP;
+        out.near_origin[axis] = error > 0.0f ? (negative ? below(o - error) : above(o + error)) : o;
+        out.far_origin[axis] = error > 0.0f ? (negative ? above(o + error) : below(o - error)) : o;
+        out.near_rdir[axis] = sign / near_d * SLAB_DOWN;
+        out.far_rdir[axis] = sign / far_d * SLAB_UP;
     }
     return out;
 }

@@ -3,17 +3,21 @@
 // Model: IEEE single precision, round to nearest, no contraction: fl(a op b) = (a op b)(1 + e), |e| <= EPS.
 // gamma(n) = n EPS / (1 - n EPS) bounds n such factors in a row (Higham 2002, 3.1).
 //
-// 1. Box test (box.h), after Woop, Benthin, Wald 2013, appendix.
+// 1. Box test (box.h); the idea of Woop, Benthin, Wald 2013, appendix, with margins that follow the geometry.
 //    The triangle test decides on sheared vertices A' = fl(fl(v_x - o_x) - fl(s_x fl(v_z - o_z))), z the
 //    dominant axis of the direction, |s_x| <= 1. Relative to the exact v_x - o_x - (d_x/d_z)(v_z - o_z) its
 //    error is at most 2 EPS |v_x - o_x| + 5 EPS |v_z - o_z| (one rounding of each difference, one of s_x, one
-//    of the product, one of the sum). The test is exact for the rounded A' (triangle.h): an accepted ray
-//    passes, at the t that the test returns, within that distance of the triangle along x, likewise y, and
-//    exactly through its z range. So a box widened by SHEAR_ERROR (extent_x + extent_z) along x and y, not
-//    along z, contains the ray at t; extents are taken over the root box, so they hold for every node.
-//    The slab distance fl(fl(plane - origin') * rdir) has three roundings (difference, reciprocal, product),
-//    t itself one more: rdir is moved by 8 EPS, more than the 5 EPS needed.
-//    The difference plane - origin' rounds monotonically, so a parent's interval contains its child's.
+//    of the product, one of the sum). The test is exact for the rounded A' (triangle.h): for an accepted ray
+//    there are weights w with sum w A' = 0 in x and y, and t is the weighted depth. So the ray at t passes the
+//    triangle's point P = sum w v at a distance along x (likewise y; none along z) of at most
+//    sum w (2 EPS |v_x - o_x| + 5 EPS |v_z - o_z|). If all v_z - o_z have one sign, sum w |v_z - o_z| is
+//    |P_z - o_z| = t |d_z|; if not, each is at most the triangle's extent. Together: 7 EPS (t |d_z| + extent).
+//    Half of it widens the triangle's box when it is built (extent), half makes the ray a cone of that slope
+//    (t |d_z|): entry (plane - o) / (|d_x| + slope), exit (plane - o) / (|d_x| - slope). A cone that reaches
+//    both ways along an axis, |d_x| < 4 slope, strays from o_x by at most 5 slope t <= 5 slope / |d_z| times the
+//    root box's extent: there the slab test is whether the widened slab holds o_x at all.
+//    fl(fl(plane - o) * rdir) has three or four roundings and t one: rdir is moved by 8 EPS.
+//    fl(plane - o) is monotone, so a parent's interval contains its child's.
 //
 // 2. Point on a triangle (surface.h). b0 p0 + b1 p1 + b2 p2 with b0 = 1 - b1 - b2: each product carries the
 //    barycentric's own error (2 EPS, absolute on b0), a product and two sums: gamma(7) sum |b_i p_i| as in
@@ -29,7 +33,7 @@
 namespace luch {
 
 inline constexpr float EPS = 5.9604644775390625e-8f;  // 2^-24
-inline constexpr float SHEAR_ERROR = 6.0f * EPS;
+inline constexpr float SHEAR_ERROR = 8.0f * EPS;
 inline constexpr float SLAB_DOWN = 1.0f - 8.0f * EPS;
 inline constexpr float SLAB_UP = 1.0f + 8.0f * EPS;
 
@@ -43,5 +47,9 @@ LUCH_FN float next_up(float x) {
     return bits_float(x > 0.0f ? bits + 1u : bits - 1u);
 }
 LUCH_FN float next_down(float x) { return -next_up(-x); }
+
+// One float further, or two: without a branch, for numbers that are rounded outwards in bulk.
+LUCH_FN float above(float x) { return x + 2.0f * EPS * abs_f(x); }
+LUCH_FN float below(float x) { return x - 2.0f * EPS * abs_f(x); }
 
 }  // namespace luch
