@@ -8,8 +8,8 @@ import time
 import numpy as np
 
 COUNT = 16384  # fits the first two cache levels
-ONE = "sin cos tan asin acos atan exp exp2 log log2 libm_sin".split()
-TWO = "atan2 pow fmod libm_pow".split()
+ONE = ["sin", "cos", "tan", "asin", "acos", "atan", "exp", "exp2", "log", "log2", "libm_sin"]
+TWO = ["atan2", "pow", "fmod", "libm_pow"]
 
 
 def main(arguments: list[str]) -> int:
