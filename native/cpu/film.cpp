@@ -72,7 +72,6 @@ class LayoutBuilder {
             layout.half = take(4);
             passes.push_back({"Combined Half", 3, PassKind::HALF, layout.half});
         }
-        layout.crypto_slots = 2u * ((std::clamp(spec.cryptomatte_depth, 1u, 16u) + 1u) / 2u);
     }
 
     void add(const std::string& name) {
@@ -140,6 +139,7 @@ class LayoutBuilder {
                 name.find_first_not_of("0123456789", prefix.size()) != std::string::npos)
                 continue;
             if (layout.*crypto.channel != NONE) return true;
+            layout.crypto_slots = 2u * ((std::clamp(spec_.cryptomatte_depth, 1u, 16u) + 1u) / 2u);
             layout.*crypto.channel = take(2 * layout.crypto_slots);
             layout.any_data_pass = 1;
             for (u32 layer = 0; layer < layout.crypto_slots / 2; ++layer) {

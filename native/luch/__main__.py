@@ -1,0 +1,7 @@
+"""``python -m luch``: see :mod:`luch.cli`."""
+
+import sys
+
+from luch.cli import main
+
+sys.exit(main())

@@ -1,0 +1,225 @@
+"""The command line: renders ``.luch`` scenes without Blender and says what is in them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from luch import __version__
+from luch.scene import Scene
+from luch.scenefile import read_scene
+
+if TYPE_CHECKING:
+    from luch.render import Progress, Result
+
+CANCELLED = 130  # exit status after Ctrl+C, as shells have it
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command. Returns 0, 1 after an error that was told on stderr, 130 after Ctrl+C."""
+    options = _parser().parse_args(arguments)
+    try:
+        status: int = options.run(options)
+    except (OSError, ValueError, ImportError) as error:
+        print(f"luch: {error}", file=sys.stderr)
+        return 1
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m luch", description=__doc__)
+    parser.add_argument("--version", action="version", version=f"Luch {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    render = commands.add_parser("render", help="render a scene to a multilayer .exr or a .png")
+    render.add_argument("scene", type=Path, help="a .luch file")
+    render.add_argument("-o", "--output", type=Path, required=True, help="PATH.exr (all passes) or PATH.png (Combined)")
+    render.add_argument("--samples", type=_positive(int), help="samples per pixel (default: the scene's)")
+    render.add_argument("--time", type=_positive(float), metavar="S", help="stop after this many seconds")
+    render.add_argument("--seed", type=int, help="seed of the sampler")
+    render.add_argument("--threads", type=int, help="0: one per processor")
+    render.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    render.set_defaults(run=_render)
+
+    info = commands.add_parser("info", help="say what is in a scene")
+    info.add_argument("scene", type=Path, help="a .luch file")
+    info.set_defaults(run=_info)
+    return parser
+
+
+def _positive(kind: Callable[[str], Any]) -> Callable[[str], Any]:
+    def convert(text: str) -> Any:
+        value = kind(text)
+        if not value > 0:
+            raise argparse.ArgumentTypeError(f"{text} is not above 0")
+        return value
+
+    return convert
+
+
+def _render(options: argparse.Namespace) -> int:
+    from luch import image
+    from luch.render import render
+
+    suffix = options.output.suffix.lower()
+    if suffix not in (".exr", ".png"):
+        raise ValueError(f"{options.output}: the name must end in .exr or .png")
+    if not options.output.absolute().parent.is_dir():
+        raise ValueError(f"{options.output}: its folder does not exist. Create it first.")
+    image.openimageio()  # a missing library is told before the work, not after
+    scene = read_scene(options.scene)
+    _override(scene, options)
+    for warning in scene.warnings:
+        print(f"luch: {warning}", file=sys.stderr)
+    with _Interrupt() as interrupt, _Line(quiet=options.quiet) as line:
+
+        def watch(progress: Progress) -> bool:
+            line.show(progress)
+            return not interrupt.asked
+
+        result = render(scene, progress=watch)
+    if suffix == ".png":
+        image.write_png(options.output, result.passes["Combined"], metadata=_statistics(result))
+    else:
+        metadata = {**_statistics(result), "luch.scene": scene.name, **_cryptomatte(scene, "ViewLayer")}
+        image.write_exr(options.output, result.passes, metadata=metadata)
+    seconds = result.stats.get("render_seconds", 0.0)
+    print(f"{options.output}: {result.stats.get('samples', 0)} samples in {seconds:.2f} s")
+    return CANCELLED if result.cancelled else 0
+
+
+def _override(scene: Scene, options: argparse.Namespace) -> None:
+    settings = scene.settings
+    if options.samples is not None:
+        settings.samples = options.samples
+    if options.time is not None:
+        settings.time_limit = options.time
+    if options.seed is not None:
+        settings.seed = options.seed
+    if options.threads is not None:
+        settings.threads = options.threads
+
+
+def _statistics(result: Result) -> dict[str, str | int | float]:
+    """Statistics as header fields: plain values as they are, others as JSON."""
+    fields: dict[str, str | int | float] = {}
+    for key, value in result.stats.items():
+        plain = isinstance(value, str | int | float) and not isinstance(value, bool)
+        # A header's integers have 32 bits.
+        if plain and not (isinstance(value, int) and abs(value) >= 2**31):
+            fields[f"luch.{key}"] = value
+        else:
+            fields[f"luch.{key}"] = json.dumps(value, default=str)
+    return fields
+
+
+def _cryptomatte(scene: Scene, layer: str) -> dict[str, str]:
+    """Header fields by which compositors find the names behind cryptomatte's ids."""
+    from luch.cryptomatte import manifest, name_to_hash
+
+    names = {
+        "Object": [o.name for o in scene.objects],
+        "Material": [m.name for m in scene.materials],
+        "Asset": [o.asset for o in scene.objects],
+    }
+    fields: dict[str, str] = {}
+    for kind, members in names.items():
+        if not any(name.startswith(f"Crypto{kind}") for name in scene.film.passes):
+            continue
+        title = f"{layer}.Crypto{kind}"
+        prefix = f"cryptomatte/{name_to_hash(title):08x}"[:-1]  # seven digits
+        fields[f"{prefix}/name"] = title
+        fields[f"{prefix}/hash"] = "MurmurHash3_32"
+        fields[f"{prefix}/conversion"] = "uint32_to_float32"
+        fields[f"{prefix}/manifest"] = json.dumps(manifest(sorted(set(members))), ensure_ascii=False)
+    return fields
+
+
+class _Interrupt:
+    """Turns the first Ctrl+C into a request to stop and keep the picture; a second one stops at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: Any = None
+
+    def __enter__(self) -> _Interrupt:
+        self._before = signal.signal(signal.SIGINT, self._ask)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _ask(self, _signal: int, _frame: FrameType | None) -> None:
+        self.asked = True
+        signal.signal(signal.SIGINT, self._before)
+
+
+class _Line:
+    """One line of progress, rewritten in place on a terminal, left out where nobody watches."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._on = not quiet and sys.stderr.isatty()
+        self._next = 0.0
+
+    def __enter__(self) -> _Line:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._on:
+            print(file=sys.stderr)
+
+    def show(self, progress: Progress) -> None:
+        now = time.monotonic()
+        if not self._on or now < self._next:
+            return
+        self._next = now + 0.25
+        left = f", {progress.remaining_seconds:.0f} s left" if np.isfinite(progress.remaining_seconds) else ""
+        text = f"{progress.fraction:6.1%}  {progress.samples} of {progress.total_samples} samples{left}"
+        print(f"\r{text:70}", end="", file=sys.stderr, flush=True)
+
+
+def _info(options: argparse.Namespace) -> int:
+    scene = read_scene(options.scene)
+    print("\n".join(describe(scene)))
+    return 0
+
+
+def describe(scene: Scene) -> list[str]:
+    """What a scene holds, one line per subject."""
+    film, settings, camera = scene.film, scene.settings, scene.camera
+    triangles = [len(mesh.triangles) for mesh in scene.meshes]
+    lines = [f"{scene.name}, frame {scene.frame}"]
+    lines.append(f"  meshes      {len(triangles)} with {sum(triangles):,} triangles")
+    if scene.instances is not None:
+        mesh_of = np.array([o.mesh for o in scene.objects] or [0])
+        seen = np.array(triangles or [0])[mesh_of[scene.instances.object]].sum() if len(scene.instances.object) else 0
+        lines.append(
+            f"  instances   {len(scene.instances.object):,} of {len(scene.objects)} objects: {seen:,} triangles"
+        )
+    lines.append(f"  materials   {', '.join(m.name for m in scene.materials) or 'none'}")
+    pixels = sum(picture.pixels.nbytes for picture in scene.images)
+    lines.append(f"  images      {len(scene.images)}, {pixels / 1e6:.1f} MB")
+    kinds = [light.kind for light in scene.lights]
+    lines.append(f"  lights      {', '.join(f'{kinds.count(k)} {k.lower()}' for k in sorted(set(kinds))) or 'none'}")
+    lines.append(f"  world       {scene.world.name if scene.world else 'none'}")
+    lines.append(f"  camera      {camera.kind.lower()}, {camera.lens_mm:g} mm{', depth of field' * camera.use_dof}")
+    border = f", border {film.border}" if film.border else ""
+    lines.append(
+        f"  film        {film.width} x {film.height}{border}, {film.filter.lower()} {film.filter_width:g} pixels"
+    )
+    lines.append(f"  passes      {', '.join(film.passes)}")
+    limit = f", at most {settings.time_limit:g} s" if settings.time_limit else ""
+    lines.append(
+        f"  sampling    {settings.samples} samples{limit}, seed {settings.seed}, {settings.max_bounces} bounces"
+    )
+    lines += [f"  warning     {warning}" for warning in scene.warnings]
+    return lines

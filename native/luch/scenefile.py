@@ -1,0 +1,216 @@
+"""Scene files: one ``.luch`` holds one scene, in a zip of a JSON header and ``.npy`` arrays.
+
+The header mirrors the dataclasses of :mod:`luch.scene` field by field, so that a new field needs no change
+here: files written before it take its default. Nothing in a file is ever executed (no pickles).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+import types
+import typing
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from luch import scene as scene_module
+from luch.scene import Scene
+
+FORMAT = "luch scene"
+# Raised when a file of the new kind would be misread by the old reader.
+VERSION = 1
+HEADER = "scene.json"
+
+
+class SceneFileError(ValueError):
+    """A file that is not a scene, or not a whole one. The message names the file, the fact and the remedy."""
+
+
+def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Writes a scene. The file appears whole or not at all.
+
+    Raises OSError if it cannot be written, TypeError if a field holds what its annotation does not allow.
+    """
+    target = Path(path)
+    partial = target.with_name(target.name + ".part")
+    try:
+        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            encoder = _Encoder(archive)
+            body = encoder.encode(scene, "Scene")
+            header = {"format": FORMAT, "version": VERSION, "scene": body}
+            archive.writestr(HEADER, json.dumps(header, ensure_ascii=False, indent=1))
+        os.replace(partial, target)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """Reads a scene. Raises SceneFileError if the file is damaged or not a scene, OSError if it is not there."""
+    name = os.fspath(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            header = json.loads(archive.read(HEADER))
+            _check_header(header, name)
+            scene = _Decoder(archive).decode(header["scene"], Scene, "Scene")
+    except SceneFileError:
+        raise
+    except _Damage as damage:
+        raise SceneFileError(f"{name}: {damage}. Export the scene again.") from damage
+    except (zipfile.BadZipFile, zlib.error, KeyError, ValueError, EOFError, NotImplementedError, RuntimeError) as error:
+        raise SceneFileError(f"{name}: this is not a whole .luch file ({error}). Export the scene again.") from error
+    assert isinstance(scene, Scene)
+    return scene
+
+
+def _check_header(header: Any, name: str) -> None:
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise SceneFileError(f"{name}: this zip holds no Luch scene. Choose a file that Luch exported.")
+    version = header.get("version")
+    if not isinstance(version, int) or version < 1:
+        raise SceneFileError(f"{name}: its version {version!r} means nothing. Export the scene again.")
+    if version > VERSION:
+        raise SceneFileError(
+            f"{name}: written in version {version} of the format, this Luch reads up to {VERSION}. Update Luch."
+        )
+
+
+class _Damage(ValueError):
+    """A header that does not fit the dataclasses: where, and what."""
+
+
+class _Encoder:
+    """Values to JSON; arrays to members of the archive, one member for all uses of one array."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self._members: dict[int, str] = {}
+        self._kept: list[NDArray[Any]] = []  # alive, so that no id is used twice
+
+    def encode(self, value: Any, where: str) -> Any:
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            return {f.name: self.encode(getattr(value, f.name), f"{where}.{f.name}") for f in dataclasses.fields(value)}
+        if isinstance(value, np.ndarray):
+            return {"array": self._store(value, where)}
+        if isinstance(value, dict):
+            return {"map": [[key, self.encode(item, f"{where}[{key!r}]")] for key, item in value.items()]}
+        if isinstance(value, list | tuple):
+            return [self.encode(item, f"{where}[{i}]") for i, item in enumerate(value)]
+        if isinstance(value, np.generic):
+            value = value.item()
+        if value is None or isinstance(value, bool | int | float | str):
+            return value
+        raise TypeError(f"{where} holds a {type(value).__name__}, which a scene file cannot keep")
+
+    def _store(self, array: NDArray[Any], where: str) -> str:
+        if array.dtype.hasobject:
+            raise TypeError(f"{where} is an array of Python objects, which a scene file cannot keep")
+        if id(array) not in self._members:
+            member = f"arrays/{len(self._members)}.npy"
+            buffer = io.BytesIO()
+            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+            self._archive.writestr(member, buffer.getbuffer())
+            self._members[id(array)] = member
+            self._kept.append(array)
+        return self._members[id(array)]
+
+
+class _Decoder:
+    """JSON to values, led by the annotations of the dataclasses."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self._arrays: dict[str, NDArray[Any]] = {}
+
+    def decode(self, value: Any, hint: Any, where: str) -> Any:
+        origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+        if origin in (types.UnionType, typing.Union):
+            return self._decode_union(value, arguments, where)
+        if _dtype(hint) is not None:
+            return self._load(value, (hint,), where)
+        if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+            return self._decode_dataclass(value, hint, where)
+        if origin is list:
+            items = _expect(value, list, where)
+            return [self.decode(item, arguments[0], f"{where}[{i}]") for i, item in enumerate(items)]
+        if origin is tuple:
+            items = _expect(value, list, where)
+            if len(items) != len(arguments):
+                raise _Damage(f"{where} has {len(items)} items, not {len(arguments)}")
+            pairs = zip(items, arguments, strict=True)
+            return tuple(self.decode(item, kind, f"{where}[{i}]") for i, (item, kind) in enumerate(pairs))
+        if origin is dict:
+            items = _expect(_expect(value, dict, where).get("map"), list, where)
+            return {key: self.decode(item, arguments[1], f"{where}[{key!r}]") for key, item in items}
+        if hint is float and isinstance(value, int) and not isinstance(value, bool):
+            return float(value)
+        return _expect(value, hint, where)
+
+    def _decode_union(self, value: Any, members: tuple[Any, ...], where: str) -> Any:
+        if value is None and type(None) in members:
+            return None
+        rest = [member for member in members if member is not type(None)]
+        if all(_dtype(member) is not None for member in rest):
+            return self._load(value, tuple(rest), where)
+        if len(rest) != 1:
+            raise TypeError(f"{where}: a union of several kinds cannot be read back")
+        return self.decode(value, rest[0], where)
+
+    def _decode_dataclass(self, value: Any, kind: type, where: str) -> Any:
+        given = _expect(value, dict, where)
+        hints = _hints(kind)
+        unknown = sorted(set(given) - set(hints))
+        if unknown:
+            raise _Damage(f"{where} has a field {unknown[0]!r} that this version does not know")
+        values = {name: self.decode(item, hints[name], f"{where}.{name}") for name, item in given.items()}
+        try:
+            return kind(**values)
+        except TypeError as error:  # a field without default is missing
+            raise _Damage(f"{where}: {error}") from error
+
+    def _load(self, value: Any, allowed: tuple[Any, ...], where: str) -> NDArray[Any]:
+        member = _expect(_expect(value, dict, where).get("array"), str, where)
+        if member not in self._arrays:
+            try:
+                data = io.BytesIO(self._archive.read(member))
+                self._arrays[member] = np.lib.format.read_array(data, allow_pickle=False)
+            except KeyError as error:
+                raise _Damage(f"{where}: {member} is missing from the file") from error
+            except ValueError as error:
+                raise _Damage(f"{where}: {member} is not an array ({error})") from error
+        array = self._arrays[member]
+        dtypes = [_dtype(hint) for hint in allowed]
+        if array.dtype not in dtypes:
+            expected = " or ".join(str(dtype) for dtype in dtypes)
+            raise _Damage(f"{where} holds {array.dtype} numbers, not {expected}")
+        return array
+
+
+def _hints(kind: type) -> dict[str, Any]:
+    """Field names of a dataclass and what they may hold."""
+    hints = typing.get_type_hints(kind, vars(scene_module))
+    return {f.name: hints[f.name] for f in dataclasses.fields(kind)}
+
+
+def _dtype(hint: Any) -> np.dtype[Any] | None:
+    """The number type of an NDArray annotation; None for any other annotation."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is np.ndarray:  # numpy before 2.5 writes the alias out
+        arguments = typing.get_args(arguments[1])
+    elif origin is not NDArray:
+        return None
+    dtype: np.dtype[Any] = np.dtype(arguments[0])
+    return dtype
+
+
+def _expect(value: Any, kind: Any, where: str) -> Any:
+    wrong_bool = isinstance(value, bool) and kind is not bool  # True is an int to Python, not to us
+    if not isinstance(value, kind) or wrong_bool:
+        raise _Damage(f"{where} holds {type(value).__name__}, not {kind.__name__}")
+    return value
