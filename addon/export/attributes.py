@@ -10,6 +10,7 @@ from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_TANGENT, OPS
 from numpy.typing import NDArray
 
 from .context import ExportContext
+from .derived import derived_attribute
 from .tangents import corner_tangents
 
 I32 = NDArray[np.int32]
@@ -82,6 +83,8 @@ def add_attributes(
             _add_tangents(result, mesh, name, corners)
         elif name == GENERATED and undeformed is not None:
             _add_generated(result, undeformed)
+        elif (derived := derived_attribute(name, result, mesh)) is not None:
+            result.attributes[name] = derived
 
 
 def _attribute(layer: Any, corners: I32, faces: I32, mesh_name: str, context: ExportContext) -> Attribute | None:

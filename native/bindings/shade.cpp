@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "bindings/bind.h"
+#include "cpu/geometry/islands.h"
 #include "cpu/shade/link.h"
+#include "luch/camera/camera.h"
 
 namespace luch::bindings {
 namespace {
@@ -37,6 +39,7 @@ struct TestScene {
     MeshView mesh{};
     InstanceView instance{};
     ObjectView object{};
+    CameraView camera{};
     MaterialView material{};
     u32 material_table = 0;
     std::vector<u16> material_slots;
@@ -64,6 +67,11 @@ void load_mesh(TestScene& scene, const py::dict& mesh) {
     scene.material_slots.assign(scene.triangles.size() / 3, 0);
     scene.mesh.vertex_count = u32(scene.positions.size() / 3);
     scene.mesh.triangle_count = u32(scene.triangles.size() / 3);
+    if (mesh.contains("normals")) {  // per vertex, or per corner of each triangle
+        scene.normals = to_vector<float>(py::cast<Floats>(mesh["normals"]));
+        const bool corners = scene.normals.size() == scene.triangles.size() * 3;
+        scene.mesh.normals_domain = corners ? Domain::CORNER : Domain::POINT;
+    }
     if (mesh.contains("texture_location")) scene.mesh.texture_location = to_vec3(mesh["texture_location"]);
     if (mesh.contains("texture_size")) scene.mesh.texture_size = to_vec3(mesh["texture_size"]);
     if (!mesh.contains("attributes")) return;
@@ -80,6 +88,19 @@ void load_mesh(TestScene& scene, const py::dict& mesh) {
         scene.attributes.push_back({u32(scene.attribute_data.size()), channels, code});
         scene.attribute_data.insert(scene.attribute_data.end(), data.data(), data.data() + data.size());
     }
+}
+
+// An orthographic camera: matrices, metres per pixel, and the frame in pixels.
+void load_camera(TestScene& scene, const py::dict& camera) {
+    const float metres = py::cast<float>(camera["pixel_size"]);
+    const float width = py::cast<float>(camera["width"]), height = py::cast<float>(camera["height"]);
+    scene.camera.kind = CameraKind::ORTHOGRAPHIC;
+    scene.camera.to_world = to_affine(py::cast<Floats>(camera["to_world"]));
+    scene.camera.to_camera = to_affine(py::cast<Floats>(camera["to_camera"]));
+    scene.camera.centre = {0.5f * width, 0.5f * height};
+    scene.camera.scale = {metres, metres};
+    scene.view.camera = &scene.camera;
+    scene.view.frame_size = {width, height};
 }
 
 void load_scene(TestScene& scene, const py::dict& description) {
@@ -108,14 +129,14 @@ void load_scene(TestScene& scene, const py::dict& description) {
     }
     if (description.contains("object_location")) scene.object.location = to_vec3(description["object_location"]);
     SceneView& view = scene.view;
-    view.world_to_camera = affine_of("world_to_camera");
-    if (description.contains("camera_position")) view.camera_position = to_vec3(description["camera_position"]);
     if (description.contains("origin")) view.origin = to_vec3(description["origin"]);
     view.uv_attribute = u32_of("uv_attribute", NONE);
     view.color_attribute = u32_of("color_attribute", NONE);
     view.generated_attribute = u32_of("generated_attribute", NONE);
     view.tangent_attribute = u32_of("tangent_attribute", NONE);
+    if (description.contains("camera")) load_camera(scene, py::cast<py::dict>(description["camera"]));
     view.positions = scene.positions.data();
+    view.normals = scene.normals.data();
     view.triangles = scene.triangles.data();
     view.material_slots = scene.material_slots.data();
     view.attribute_data = scene.attribute_data.data();
@@ -135,7 +156,8 @@ struct PointColumn {
     float* (*at)(ShadePoints&, int);
 };
 
-#define LUCH_COLUMN(NAME, FIELD) [](ShadePoints& p, int k) { return k == 0 ? p.FIELD##x : k == 1 ? p.FIELD##y : p.FIELD##z; }
+#define LUCH_COLUMN(NAME, FIELD) \
+    [](ShadePoints& p, int k) { return k == 0 ? p.FIELD##x : k == 1 ? p.FIELD##y : p.FIELD##z; }
 constexpr PointColumn COLUMNS[] = {
     {"position", 3, LUCH_COLUMN("position", p)},
     {"normal", 3, LUCH_COLUMN("normal", n)},
@@ -177,8 +199,8 @@ void load_points(ShadePoints& points, const py::dict& arrays, size_t first, int 
 
 // Runs a program over N points; returns registers (register_count, N), emission (N, 3), transparent
 // (N, 3), holdout (N,), lobe counts (N,).
-py::dict run_program(const Words& code, const Floats& constants, u32 register_count, const Floats& tables,
-                     size_t count, const py::dict& points, const py::dict& scene_description) {
+py::dict run_program(const Words& code, const Floats& constants, u32 register_count, const Floats& tables, size_t count,
+                     const py::dict& points, const py::dict& scene_description) {
     TestScene scene;
     cpu::ProgramSource source;
     source.owner = "test";
@@ -218,8 +240,22 @@ py::dict run_program(const Words& code, const Floats& constants, u32 register_co
             lobes.mutable_at(row) = set.count;
         }
     }
-    return py::dict(py::arg("registers") = values, py::arg("emission") = emission,
-                    py::arg("transparent") = transparent, py::arg("holdout") = holdout, py::arg("lobes") = lobes);
+    return py::dict(py::arg("registers") = values, py::arg("emission") = emission, py::arg("transparent") = transparent,
+                    py::arg("holdout") = holdout, py::arg("lobes") = lobes);
+}
+
+py::array_t<float> island_random(size_t vertex_count, const Words& edges, const Words& triangles) {
+    auto check = [&](const Words& indices, py::ssize_t width) {
+        if (indices.size() % width != 0) throw py::value_error("edges are pairs, triangles triples of vertices");
+        for (py::ssize_t k = 0; k < indices.size(); k++) {
+            if (indices.data()[k] >= vertex_count) throw py::value_error("a vertex index is out of range");
+        }
+    };
+    check(edges, 2);
+    check(triangles, 3);
+    const std::vector<float> random = cpu::island_random(vertex_count, edges.data(), size_t(edges.size()) / 2,
+                                                         triangles.data(), size_t(triangles.size()) / 3);
+    return py::array_t<float>(py::ssize_t(random.size()), random.data());
 }
 
 }  // namespace
@@ -227,6 +263,8 @@ py::dict run_program(const Words& code, const Floats& constants, u32 register_co
 void bind_shade(py::module_& m) {
     auto shade = m.def_submodule("shade", "Shader operations and programs.");
     shade.attr("LANES") = SHADE_LANES;
+    shade.def("island_random", &island_random, py::arg("vertex_count"), py::arg("edges"), py::arg("triangles"),
+              "A number in 0..1 per triangle, the same over each connected part. edges (E, 2), triangles (T, 3).");
     shade.def("op_table", &op_table, "Every operation: name, code, inputs, outputs, params, closure, constant.");
     shade.def("run_program", &run_program, py::arg("code"), py::arg("constants"), py::arg("register_count"),
               py::arg("tables"), py::arg("count"), py::arg("points") = py::dict(), py::arg("scene") = py::dict(),

@@ -12,15 +12,14 @@ import bpy
 import numpy as np
 from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_UV, Vector, float_word
 
+from ..derived import ISLAND, POINTINESS
 from .tree import Compiler, Outputs, emitter
 
 # PathFlag of shade/point.h
 _CAMERA, _SHADOW, _DIFFUSE, _GLOSSY, _SINGULAR, _REFLECT, _TRANSMIT, _VOLUME = (1 << k for k in range(8))
 
-# Attributes that the exporter computes on request.
-TANGENT_ATTRIBUTE = "tangent"  # of the active UV map; "tangent:NAME" of another: x, y, z, sign
-ISLAND_ATTRIBUTE = "island_random"  # one number in 0..1 per connected part
-POINTINESS_ATTRIBUTE = "pointiness"
+# Computed by the exporter on request.
+TANGENT_ATTRIBUTE = "tangent"  # of the active UV map; "NAME.tangent" of another: x, y, z, sign
 
 
 def position(c: Compiler) -> Vector:
@@ -47,7 +46,7 @@ def uv(c: Compiler, name: str = "") -> Vector:
 
 def tangent_slot(c: Compiler, uv_map: str) -> int:
     """Attribute slot of the tangents of a UV map, the active one without a name."""
-    return c.builder.attribute(f"{TANGENT_ATTRIBUTE}:{uv_map}" if uv_map else TANGENT_ATTRIBUTE)
+    return c.builder.attribute(f"{uv_map}.{TANGENT_ATTRIBUTE}" if uv_map else TANGENT_ATTRIBUTE)
 
 
 @emitter("ShaderNodeValue")
@@ -103,7 +102,7 @@ def geometry(c: Compiler, node: bpy.types.Node) -> Outputs:
         "Parametric": b.op3("POINT_PARAMETRIC", (), corner),
         "Backfacing": b.op1("POINT_BACKFACING"),
     }
-    for identifier, name in (("Pointiness", POINTINESS_ATTRIBUTE), ("Random Per Island", ISLAND_ATTRIBUTE)):
+    for identifier, name in (("Pointiness", POINTINESS), ("Random Per Island", ISLAND)):
         if c.output_used(node, identifier):
             outputs[identifier] = b.op("ATTRIBUTE_VALUE", (), (*corner, b.attribute(name)))[0]
     return outputs
@@ -160,8 +159,8 @@ def attribute(c: Compiler, node: bpy.types.Node) -> Outputs:
 @emitter("ShaderNodeVertexColor")
 def color_attribute(c: Compiler, node: bpy.types.Node) -> Outputs:
     """Color Attribute, by name or the active one."""
-    slot = c.builder.attribute(node.layer_name)  # "" asks the exporter for the active one
-    params = (*c.offset_params(), slot if node.layer_name else ATTRIBUTE_COLOR)
+    slot = c.builder.attribute(node.layer_name) if node.layer_name else ATTRIBUTE_COLOR
+    params = (*c.offset_params(), slot)
     red, green, blue, alpha = c.builder.op("ATTRIBUTE_COLOR", (), params)
     return {"Color": (red, green, blue), "Alpha": alpha}
 

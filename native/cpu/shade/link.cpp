@@ -30,7 +30,8 @@ Program LinkedPrograms::add(const ProgramSource& source) {
     program.flags = source.flags;
     if (source.constants.size() > source.register_count) refuse(source, "it has more constants than registers");
     for (size_t at = 0; at < source.code.size();) {
-        if (at + 2 > source.code.size() || source.code[at] >= u32(op_count())) refuse(source, "an operation is unknown");
+        if (at + 2 > source.code.size() || source.code[at] >= u32(op_count()))
+            refuse(source, "an operation is unknown");
         const u32 op = source.code[at], param_count = source.code[at + 1];
         const OpInfo& info = op_info(int(op));
         const size_t registers = size_t(info.outputs + info.inputs);

@@ -116,8 +116,6 @@ LUCH_FN u32 attribute_of(const OpContext& c, u32 slot) {
     }
     return c.scene->program_attributes[c.program->first_attribute + slot];
 }
-LUCH_FN u32 aov_of(const OpContext& c, u32 slot) {
-    return c.scene->program_aovs[c.program->first_aov + slot];
-}
+LUCH_FN u32 aov_of(const OpContext& c, u32 slot) { return c.scene->program_aovs[c.program->first_aov + slot]; }
 
 }  // namespace luch

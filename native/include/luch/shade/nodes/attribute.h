@@ -99,8 +99,8 @@ LUCH_FN AttributeValue read_attribute(const OpContext& c, u32 attribute, const u
     Vec2 uv = barycentrics_at(c, params);
     float w = 1.0f - uv.x - uv.y;
     for (u32 k = 0; k < n; k++) {
-        result.value[k] = w * data[u64(index[0]) * n + k] + uv.x * data[u64(index[1]) * n + k] +
-                          uv.y * data[u64(index[2]) * n + k];
+        result.value[k] =
+            w * data[u64(index[0]) * n + k] + uv.x * data[u64(index[1]) * n + k] + uv.y * data[u64(index[2]) * n + k];
     }
     return result;
 }

@@ -57,17 +57,17 @@ struct OpClosureHoldout {
 
 // A lobe. NUMBERS inputs after the weight; params[0]: bump correction; BODY has `read` (the inputs),
 // `weight`, `set` and `context`.
-#define LUCH_LOBE_OP(STRUCT, NUMBERS, PARAMS, BODY)                                                  \
-    struct STRUCT {                                                                                  \
-        static constexpr int inputs = 3 + NUMBERS, outputs = 0, params = PARAMS;                     \
-        LUCH_FN static void eval(const OpContext& c, const u32* params, const float* in, float*) {   \
-            if (skips_lobes(c)) return;                                                              \
-            InputReader read{in};                                                                    \
-            Color weight = read.vec3();                                                              \
-            SetupContext context = setup_context(c, params[0] != 0);                                 \
-            ClosureSet& set = *c.closures;                                                           \
-            BODY                                                                                     \
-        }                                                                                            \
+#define LUCH_LOBE_OP(STRUCT, NUMBERS, PARAMS, BODY)                                                \
+    struct STRUCT {                                                                                \
+        static constexpr int inputs = 3 + NUMBERS, outputs = 0, params = PARAMS;                   \
+        LUCH_FN static void eval(const OpContext& c, const u32* params, const float* in, float*) { \
+            if (skips_lobes(c)) return;                                                            \
+            InputReader read{in};                                                                  \
+            Color weight = read.vec3();                                                            \
+            SetupContext context = setup_context(c, params[0] != 0);                               \
+            ClosureSet& set = *c.closures;                                                         \
+            BODY                                                                                   \
+        }                                                                                          \
     }
 
 LUCH_LOBE_OP(OpClosureDiffuse, 7, 1, {  // colour, roughness, normal

@@ -10,9 +10,7 @@ LUCH_FN Vec3 rgb_to_hsv(Vec3 c) {
     float hi = max_component(c), lo = min_component(c), span = hi - lo;
     float s = hi != 0.0f ? span / hi : 0.0f;
     float per = span != 0.0f ? 1.0f / span : 0.0f;
-    float h = c.x == hi   ? (c.y - c.z) * per
-              : c.y == hi ? 2.0f + (c.z - c.x) * per
-                          : 4.0f + (c.x - c.y) * per;
+    float h = c.x == hi ? (c.y - c.z) * per : c.y == hi ? 2.0f + (c.z - c.x) * per : 4.0f + (c.x - c.y) * per;
     h = h * (1.0f / 6.0f);
     h = h < 0.0f ? h + 1.0f : h;
     return {s != 0.0f ? h : 0.0f, s, hi};
@@ -78,7 +76,7 @@ struct OpHueSaturation {  // in: hue (0.5 changes nothing), saturation, value, f
 };
 
 // Componentwise adjustments: a is the colour's component.
-LUCH_FLOAT_OP2(OpColorInvert, b*(1.0f - a) + (1.0f - b) * a);
+LUCH_FLOAT_OP2(OpColorInvert, b * (1.0f - a) + (1.0f - b) * a);
 LUCH_FLOAT_OP3(OpColorBrightContrast, max_f((1.0f + c) * a + (b - c * 0.5f), 0.0f));
 LUCH_FLOAT_OP2(OpColorGamma, b == 0.0f ? 1.0f : (a > 0.0f ? pow_f(a, b) : a));
 

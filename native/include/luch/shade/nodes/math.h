@@ -6,29 +6,29 @@
 namespace luch {
 
 // A unary, binary or ternary float operation: arguments a, b, c.
-#define LUCH_FLOAT_OP1(STRUCT, EXPRESSION)                                                \
-    struct STRUCT {                                                                       \
-        static constexpr int inputs = 1, outputs = 1;                                     \
+#define LUCH_FLOAT_OP1(STRUCT, EXPRESSION)                                                    \
+    struct STRUCT {                                                                           \
+        static constexpr int inputs = 1, outputs = 1;                                         \
         LUCH_FN static void eval(const OpContext&, const u32*, const float* in, float* out) { \
-            float a = in[0];                                                              \
-            out[0] = (EXPRESSION);                                                        \
-        }                                                                                 \
+            float a = in[0];                                                                  \
+            out[0] = (EXPRESSION);                                                            \
+        }                                                                                     \
     }
-#define LUCH_FLOAT_OP2(STRUCT, EXPRESSION)                                                \
-    struct STRUCT {                                                                       \
-        static constexpr int inputs = 2, outputs = 1;                                     \
+#define LUCH_FLOAT_OP2(STRUCT, EXPRESSION)                                                    \
+    struct STRUCT {                                                                           \
+        static constexpr int inputs = 2, outputs = 1;                                         \
         LUCH_FN static void eval(const OpContext&, const u32*, const float* in, float* out) { \
-            float a = in[0], b = in[1];                                                   \
-            out[0] = (EXPRESSION);                                                        \
-        }                                                                                 \
+            float a = in[0], b = in[1];                                                       \
+            out[0] = (EXPRESSION);                                                            \
+        }                                                                                     \
     }
-#define LUCH_FLOAT_OP3(STRUCT, EXPRESSION)                                                \
-    struct STRUCT {                                                                       \
-        static constexpr int inputs = 3, outputs = 1;                                     \
+#define LUCH_FLOAT_OP3(STRUCT, EXPRESSION)                                                    \
+    struct STRUCT {                                                                           \
+        static constexpr int inputs = 3, outputs = 1;                                         \
         LUCH_FN static void eval(const OpContext&, const u32*, const float* in, float* out) { \
-            float a = in[0], b = in[1], c = in[2];                                        \
-            out[0] = (EXPRESSION);                                                        \
-        }                                                                                 \
+            float a = in[0], b = in[1], c = in[2];                                            \
+            out[0] = (EXPRESSION);                                                            \
+        }                                                                                     \
     }
 
 LUCH_FLOAT_OP2(OpMathAdd, a + b);
@@ -96,11 +96,11 @@ LUCH_FLOAT_OP1(OpMathSinh, __builtin_sinhf(a));
 LUCH_FLOAT_OP1(OpMathCosh, __builtin_coshf(a));
 LUCH_FLOAT_OP1(OpMathTanh, __builtin_tanhf(a));
 LUCH_FLOAT_OP1(OpMathRadians, a*(PI / 180.0f));
-LUCH_FLOAT_OP1(OpMathDegrees, a*(180.0f / PI));
+LUCH_FLOAT_OP1(OpMathDegrees, a * (180.0f / PI));
 
 // Clamp (a between b and c), a blend of a and b by c, and the use_clamp check box.
 LUCH_FLOAT_OP3(OpMathClamp, clamp_f(a, b, c));
-LUCH_FLOAT_OP3(OpMathMix, a*(1.0f - c) + b * c);
+LUCH_FLOAT_OP3(OpMathMix, a * (1.0f - c) + b * c);
 LUCH_FLOAT_OP1(OpMathSaturate, saturate_f(a));
 
 }  // namespace luch

@@ -22,14 +22,14 @@ LUCH_FN const InstanceView* instance_at(const OpContext& c) {
 }
 
 // An input operation of no inputs: BODY sets out from c and params.
-#define LUCH_POINT_OP(STRUCT, OUTPUTS, PARAMS, BODY)                                            \
-    struct STRUCT {                                                                             \
-        static constexpr int inputs = 0, outputs = OUTPUTS, params = PARAMS;                    \
-        static constexpr bool reads_point = true;                                               \
+#define LUCH_POINT_OP(STRUCT, OUTPUTS, PARAMS, BODY)                                                \
+    struct STRUCT {                                                                                 \
+        static constexpr int inputs = 0, outputs = OUTPUTS, params = PARAMS;                        \
+        static constexpr bool reads_point = true;                                                   \
         LUCH_FN static void eval(const OpContext& c, const u32* params, const float*, float* out) { \
-            (void)params;                                                                       \
-            BODY                                                                                \
-        }                                                                                       \
+            (void)params;                                                                           \
+            BODY                                                                                    \
+        }                                                                                           \
     }
 
 // Blender's world position: the scene's origin is added back. A world's direction stays one.
@@ -122,8 +122,8 @@ LUCH_POINT_OP(OpCameraData, 5, 0, {
 
 LUCH_POINT_OP(OpObjectLocation, 3, 0, {
     const InstanceView* i = instance_at(c);
-    store_vec3(out, i ? make_vec3(i->to_world.m[3], i->to_world.m[7], i->to_world.m[11]) + c.scene->origin
-                      : make_vec3(0.0f));
+    store_vec3(
+        out, i ? make_vec3(i->to_world.m[3], i->to_world.m[7], i->to_world.m[11]) + c.scene->origin : make_vec3(0.0f));
 });
 LUCH_POINT_OP(OpObjectColor, 4, 0, {
     const InstanceView* i = instance_at(c);
