@@ -99,18 +99,46 @@ class OneInstruction {
     std::vector<float> registers_;
 };
 
+// pixels: (H, W, C) contiguous uint8, float16 or float32; the caller keeps them alive.
+ImageView view_image(const py::array& pixels, bool srgb, int alpha) {
+    const char kind = pixels.dtype().kind();
+    const py::ssize_t size = pixels.itemsize();
+    if (pixels.ndim() != 3 || !(pixels.flags() & py::array::c_style) || pixels.shape(2) > 4) {
+        throw std::invalid_argument("An image must be a contiguous (H, W, 1..4) array.");
+    }
+    const bool byte = kind == 'u' && size == 1, half = kind == 'f' && size == 2, single = kind == 'f' && size == 4;
+    if (!byte && !half && !single) throw std::invalid_argument("An image must be uint8, float16 or float32.");
+    ImageView view{};
+    view.pixels = pixels.data();
+    view.height = u32(pixels.shape(0));
+    view.width = u32(pixels.shape(1));
+    view.channels = u8(pixels.shape(2));
+    view.format = byte ? PixelFormat::U8 : (half ? PixelFormat::F16 : PixelFormat::F32);
+    view.srgb = srgb;
+    view.alpha = u8(alpha);
+    return view;
+}
+
 py::array_t<float> run_texture(const std::string& name, const FloatRows& inputs, const std::vector<u32>& params,
-                               const FloatRows& table, bool one_by_one) {
+                               const FloatRows& table, const std::vector<py::tuple>& images, bool one_by_one) {
     const TextureOp& op = find_op(name);
     if (inputs.ndim() != 2 || inputs.shape(0) != op.inputs) {
         throw std::invalid_argument(name + " takes inputs of shape (" + std::to_string(op.inputs) + ", N).");
     }
-    if (int(params.size()) != op.params) {
-        throw std::invalid_argument(name + " takes " + std::to_string(op.params) + " params.");
+    if (int(params.size()) < op.params) {
+        throw std::invalid_argument(name + " takes " + std::to_string(op.params) + " params or more.");
     }
     py::array_t<float> outputs({py::ssize_t(op.outputs), inputs.shape(1)});
     OneInstruction run(op, params);
     run.scene.tables = table.data();
+    std::vector<ImageView> views;
+    std::vector<u32> slots;
+    for (const py::tuple& image : images) {
+        slots.push_back(u32(views.size()));
+        views.push_back(view_image(py::cast<py::array>(image[0]), py::cast<bool>(image[1]), py::cast<int>(image[2])));
+    }
+    run.scene.images = views.data();
+    run.scene.program_images = slots.data();
     const OpContext context{&run.scene, &run.program, nullptr, 0, nullptr, nullptr};
     const Call call{&context, params.data(), inputs.data(), outputs.mutable_data(), inputs.shape(1)};
     if (one_by_one) {
@@ -126,10 +154,12 @@ py::array_t<float> run_texture(const std::string& name, const FloatRows& inputs,
 void bind_textures(py::module_& m) {
     auto textures = m.def_submodule("textures", "Texture operations over float32 arrays.");
     textures.def("run", &run_texture, py::arg("name"), py::arg("inputs"), py::arg("params") = std::vector<u32>{},
-                 py::arg("table") = FloatRows(0), py::arg("one_by_one") = false,
+                 py::arg("table") = FloatRows(0), py::arg("images") = std::vector<py::tuple>{},
+                 py::arg("one_by_one") = false,
                  "Runs one operation of shade/textures/ops.inc. inputs: float32 (inputs, N). Returns float32\n"
-                 "(outputs, N). table: what the program's tables hold. one_by_one: the scalar path that CUDA\n"
-                 "uses instead of the interpreter's chunks.");
+                 "(outputs, N). table: what the program's tables hold. images: tuples (pixels (H, W, 1..4) uint8,\n"
+                 "float16 or float32, bottom row first; is sRGB; ImageAlpha). one_by_one: the scalar path that\n"
+                 "CUDA uses instead of the interpreter's chunks.");
     textures.def(
         "operations",
         [] {

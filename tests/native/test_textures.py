@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 F32 = NDArray[np.float32]
 run = core.textures.run
 OPERATIONS: dict[str, tuple[int, int, int]] = core.textures.operations()
-PROCEDURAL = sorted(OPERATIONS)
+FROM_TABLES = {"IMAGE", "IMAGE_BOX", "ENVIRONMENT", "IES", "BLACKBODY", "WAVELENGTH", "SKY_ATMOSPHERE", "SKY_PREETHAM"}
+PROCEDURAL = sorted(set(OPERATIONS) - FROM_TABLES)
 
 
 def inputs_of(name: str, count: int, seed: int = 1, reach: float = 20.0) -> F32:

@@ -18,7 +18,7 @@ from luch.shader import ProgramBuilder
 
 from .tree import Compiler, Context
 
-FAMILIES = ("converters", "inputs", "vectors", "colors", "closures")
+FAMILIES = ("converters", "inputs", "vectors", "colors", "textures", "closures")
 for _family in FAMILIES:
     importlib.import_module(f".{_family}", __name__)
 

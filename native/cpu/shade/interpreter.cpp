@@ -29,7 +29,8 @@ void run_op(const Run& run, const u32* operands) {
     const int count = run.points->count;
     // Operations written over packs of lanes (textures/lane_op.h) loop for themselves.
     if constexpr (requires { &Op::eval_lanes; }) {
-        Op::eval_lanes(params, read, written, count);
+        const OpContext context{run.scene, run.program, run.points, 0, nullptr, nullptr};
+        Op::eval_lanes(context, params, read, written, count);
         return;
     }
     // Lanes are independent: an output may share its register with an input of the same lane only.

@@ -19,7 +19,7 @@
 // the point), else the program builder folds the operation when its inputs are constant.
 //
 // An operation whose loops differ in length from lane to lane (fractal noise) cannot vectorise so. It
-// may add `static void eval_lanes(params, in, out, count)` over arrays of lanes: see textures/lane_op.h.
+// may add `static void eval_lanes(context, params, in, out, count)` over arrays of lanes: see textures/lane_op.h.
 #pragma once
 #include "luch/bsdf/closure.h"
 #include "luch/math/fn.h"

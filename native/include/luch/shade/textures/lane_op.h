@@ -16,7 +16,7 @@ struct LaneOp {
     // in, out: one array of SHADE_LANES floats per register. Lanes past count hold anything: they are
     // computed along and not looked at. An output array may be an input array.
     // Compiled once per operation, by cpu/shade/texture_lanes.cpp.
-    static void eval_lanes(const u32* params, const float* const* in, float* const* out, int count);
+    static void eval_lanes(const OpContext&, const u32* params, const float* const* in, float* const* out, int count);
 #endif
 };
 
