@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 import types
 from collections.abc import Callable
@@ -137,3 +138,14 @@ def test_info_says_what_is_in_a_scene(file: Path, capsys: pytest.CaptureFixture[
     for part in ("Hof", "1 with 1 triangles", "Stein", "2 area, 1 sun", "depth of field", "8 x 4", "has no normals"):
         assert part in text
     assert all(line.strip() for line in describe(Scene()))
+
+
+def test_python_m_luch_renders_a_file_from_nothing_else(file: Path) -> None:
+    output = file.parent / "real.exr"
+    environment = {"PYTHONPATH": str(Path(image.__file__).parents[1])}
+    command = [sys.executable, "-m", "luch", "render", str(file), "-o", str(output), "--samples", "2", "--threads", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    passes, metadata = image.read_exr(output)
+    assert passes["ViewLayer.Combined"].shape == (4, 8, 4) and metadata["luch.samples"] == 2
+    assert "ViewLayer.CryptoObject02" in passes
