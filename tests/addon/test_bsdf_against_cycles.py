@@ -24,10 +24,11 @@ bpy = pytest.importorskip("bpy")
 oiio = pytest.importorskip("OpenImageIO")
 
 Floats = NDArray[np.float64]
+CAMERA, BACKFACING = 1, 512
 TILE = 6  # pixels
 SAMPLES = 1024  # per pixel
 COLUMNS = 8
-ANGLES = (20.0, 75.0)  # degrees from the normal
+VIEWS = ((20.0, False), (75.0, False), (50.0, True))  # degrees from the normal; seen from behind
 OUR_SAMPLES = 1 << 19
 RELATIVE = 0.002
 LOOSER = {"glossy phong": 0.012, "aniso phong": 0.012}  # see above
@@ -110,6 +111,19 @@ MATERIALS: dict[str, Material] = {
         {},
         {"Emission Strength": 0.5, "Emission Color": GOLD, "Coat Weight": 1.0, "Sheen Weight": 0.6, "Alpha": 0.8},
     ),
+    "bumped towards": ("Diffuse", {}, {"Color": BLUE, "Normal": (0.6, 0.3, 0.74)}),
+    "bumped away": ("Diffuse", {}, {"Color": BLUE, "Normal": (-0.5, 0.3, 0.81), "Roughness": 0.4}),
+    "bumped glossy": (
+        "Anisotropic",
+        {"distribution": "MULTI_GGX"},
+        {"Color": GOLD, "Roughness": 0.4, "Normal": (-0.4, 0.5, 0.77)},
+    ),
+    "bumped glass": ("Glass", {"distribution": "MULTI_GGX"}, {"Roughness": 0.3, "Normal": (-0.3, 0.4, 0.87)}),
+    "bumped coat": (
+        "Principled",
+        {},
+        {"Base Color": BLUE, "Coat Weight": 1.0, "Coat Normal": (0.3, 0.4, 0.87), "Normal": (-0.2, 0.3, 0.93)},
+    ),
     "thin glass": (
         "Principled",
         {"distribution": "MULTI_GGX"},
@@ -134,7 +148,7 @@ MATERIALS: dict[str, Material] = {
 }
 
 
-def our_closures(material: Material, wo: tuple[float, float, float]) -> Any:
+def our_closures(material: Material, wo: tuple[float, float, float], behind: bool) -> Any:
     node, menus, inputs = material
     ours = {name.lower().replace(" ", "_"): value for name, value in inputs.items()}
     name = {"Anisotropic": "glossy"}.get(node, node.lower())
@@ -149,7 +163,7 @@ def our_closures(material: Material, wo: tuple[float, float, float]) -> Any:
             ours["distribution"] = menus["distribution"]
         if node == "Metallic":
             ours["physical"] = menus["fresnel_type"] == "PHYSICAL_CONDUCTOR"
-    return core.bsdf.Closures(name, ours, wo)
+    return core.bsdf.Closures(name, ours, wo, path_flags=CAMERA | BACKFACING if behind else CAMERA)
 
 
 def world_light(direction: Floats) -> Floats:
@@ -164,10 +178,10 @@ def world_light(direction: Floats) -> Floats:
     )
 
 
-def our_light(material: Material, angle: float) -> Floats:
+def our_light(material: Material, angle: float, behind: bool) -> Floats:
     """(3 lights, 3 channels): what the closures send towards the viewer."""
     wo = (math.sin(angle), 0.0, math.cos(angle))
-    closures = our_closures(material, wo)
+    closures = our_closures(material, wo, behind)
     i = np.arange(OUR_SAMPLES) + 0.5
     u = np.stack([(i * c) % 1.0 for c in (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)], axis=1)
     drawn = closures.sample(u.astype(np.float32))
@@ -191,7 +205,7 @@ def build_node(material: bpy.types.Material, recipe: Material) -> None:
         setattr(closure, menu, value)
     for name, value in inputs.items():
         socket = closure.inputs[name]
-        if name == "Tangent":
+        if name in ("Tangent", "Normal", "Coat Normal"):
             constant = tree.nodes.new("ShaderNodeCombineXYZ")
             for axis, number in zip("XYZ", value, strict=True):
                 constant.inputs[axis].default_value = number
@@ -222,7 +236,7 @@ def build_world(column: int) -> bpy.types.World:
     return world
 
 
-def build_board(angle: float) -> tuple[int, int]:
+def build_board(angle: float, behind: bool) -> tuple[int, int]:
     """A scene of one square tile per material, seen under the angle; returns the tiles' columns and rows."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -233,7 +247,8 @@ def build_board(angle: float) -> tuple[int, int]:
         x, y = (k % COLUMNS - COLUMNS / 2) * width, k // COLUMNS - rows / 2
         vertices += [(x, y, 0.0), (x + width, y, 0.0), (x + width, y + 1.0, 0.0), (x, y + 1.0, 0.0)]
     mesh = bpy.data.meshes.new("Board")
-    mesh.from_pydata(vertices, [], [tuple(range(4 * k, 4 * k + 4)) for k in range(len(MATERIALS))])
+    corners = (3, 2, 1, 0) if behind else (0, 1, 2, 3)
+    mesh.from_pydata(vertices, [], [tuple(4 * k + i for i in corners) for k in range(len(MATERIALS))])
     for name, recipe in MATERIALS.items():
         material = bpy.data.materials.new(name)
         build_node(material, recipe)
@@ -273,15 +288,15 @@ def render_tiles(column: int, columns: int, rows: int, folder: Path) -> tuple[Fl
     return tiles.mean(axis=1), tiles.std(axis=1) / TILE
 
 
-@pytest.mark.parametrize("degrees", ANGLES)
-def test_closures_send_the_light_that_cycles_sends(degrees: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("degrees", "behind"), VIEWS)
+def test_closures_send_the_light_that_cycles_sends(degrees: float, behind: bool, tmp_path: Path) -> None:
     angle = math.radians(degrees)
-    columns, rows = build_board(angle)
+    columns, rows = build_board(angle, behind)
     cycles = [render_tiles(column, columns, rows, tmp_path) for column in range(3)]
     failures = []
     print(f"\n{degrees} degrees; rows: light from everywhere, from +x, from +z; Cycles / ours - 1 in %")
     for k, (name, recipe) in enumerate(MATERIALS.items()):
-        ours = our_light(recipe, angle)
+        ours = our_light(recipe, angle, behind)
         theirs = np.array([mean[k] for mean, _ in cycles])
         error = np.array([e[k] for _, e in cycles])
         difference = theirs - ours

@@ -35,7 +35,9 @@ LUCH_FN_SLOW LobeSample sample_ashikhmin_shirley(const Lobe& l, Vec3 n_geometric
     float n_x = phong_exponent(l.alpha_x), n_y = phong_exponent(l.alpha_y);
     Frame frame = lobe_frame(l);
     // The ellipse of exponents turns a uniform angle; the four quadrants share one formula.
-    float x = sqrt_f(n_y + 1.0f) * cos_f(TWO_PI * u.x), y = sqrt_f(n_x + 1.0f) * sin_f(TWO_PI * u.x);
+    float sine, cosine;
+    sincos_turns(u.x, &sine, &cosine);
+    float x = sqrt_f(n_y + 1.0f) * cosine, y = sqrt_f(n_x + 1.0f) * sine;
     float inv = 1.0f / sqrt_f(x * x + y * y);
     x *= inv;
     y *= inv;

@@ -1,6 +1,6 @@
 // The Beckmann distribution's own parts: masking and the sampling of visible normals.
 #pragma once
-#include "luch/math/fn.h"
+#include "luch/sampling/warp.h"
 
 namespace luch {
 
@@ -87,8 +87,10 @@ LUCH_FN_SLOW Vec3 sample_visible_beckmann(Vec3 o, float alpha_x, float alpha_y, 
     float x, y;
     if (sin_o < 1e-4f) {  // seen straight on: all slopes are equally visible
         float r = sqrt_f(-log_f(max_f(1.0f - u.x, 1e-30f)));
-        x = r * cos_f(TWO_PI * u.y);
-        y = r * sin_f(TWO_PI * u.y);
+        float sine, cosine;
+        sincos_turns(u.y, &sine, &cosine);
+        x = r * cosine;
+        y = r * sine;
     } else {
         float along = sample_beckmann_slope(s.z / sin_o, u.x), across = erf_inverse_f(2.0f * u.y - 1.0f);
         float c = s.x / sin_o, d = s.y / sin_o;

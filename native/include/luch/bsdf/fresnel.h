@@ -24,9 +24,11 @@ LUCH_FN bool dielectric_amplitudes(float cos_i, float eta, Polarized* amplitude,
 
 // Unpolarised reflectance. cos_t keeps its value on total reflection.
 LUCH_FN float fresnel_dielectric(float cos_i, float eta, float* cos_t) {
-    Polarized a;
-    if (!dielectric_amplitudes(cos_i, eta, &a, cos_t)) return 1.0f;
-    return 0.5f * (a.s * a.s + a.p * a.p);
+    float t2 = (eta - 1.0f) * (eta + 1.0f) + cos_i * cos_i;  // as in dielectric_amplitudes
+    if (!(t2 > 0.0f)) return 1.0f;
+    float c = abs_f(cos_i), t = sqrt_f(t2), bent = eta * eta * c;
+    *cos_t = t / eta;
+    return 0.5f * (sqr((c - t) / (c + t)) + sqr((bent - t) / (bent + t)));
 }
 
 LUCH_FN float f0_from_ior(float ior) { return sqr((ior - 1.0f) / (ior + 1.0f)); }

@@ -35,53 +35,57 @@ LUCH_FN Frame lobe_frame(const Lobe& l) {
 }
 LUCH_FN Vec3 to_local(Vec3 w, const Frame& f) { return {dot(w, f.t), dot(w, f.b), dot(w, f.n)}; }
 
-// The microsurface as seen from one pair of directions. cos_o > 0; cos_i > 0 reflects, < 0 refracts.
+// A pair of directions and their half vector as the microsurface sees them: cosines to the normal, and
+// "stretched" squared sines alpha_x^2 x^2 + alpha_y^2 y^2 (of the half vector x^2 / alpha_x^2 + ...).
+struct FacetAngles {
+    float cos_o, cos_i, cos_h;
+    float sin2_o, sin2_i, sin2_h;
+};
+LUCH_FN FacetAngles facet_angles(const Lobe& l, Vec3 o, Vec3 i, Vec3 h) {
+    float ax2 = sqr(l.alpha_x), ay2 = sqr(l.alpha_y);
+    // Refraction has no anisotropy: the mean roughness serves.
+    if (i.z < 0.0f) ax2 = ay2 = l.alpha_x * l.alpha_y;
+    return {o.z, i.z, h.z, ax2 * sqr(o.x) + ay2 * sqr(o.y), ax2 * sqr(i.x) + ay2 * sqr(i.y),
+            sqr(h.x) / ax2 + sqr(h.y) / ay2};
+}
+// The same of an isotropic lobe, which needs no frame.
+LUCH_FN FacetAngles facet_angles_isotropic(const Lobe& l, Vec3 h, float cos_o, float cos_i) {
+    float a2 = l.alpha_x * l.alpha_y;
+    Vec3 across = cross(l.normal, h);  // 1 - cos^2 would lose the sharpest lobes to rounding
+    return {cos_o, cos_i, dot(l.normal, h), a2 * (1.0f - sqr(cos_o)), a2 * (1.0f - sqr(cos_i)),
+            length_squared(across) / a2};
+}
+
+// cos_o > 0; cos_i > 0 reflects, < 0 refracts.
 struct Facets {
     float density;   // D of the half vector
     float g1, g2;    // masking of wo, and of both, each over cos_o
 };
 
-// stretched_sin2: alpha_x^2 x^2 + alpha_y^2 y^2 of a direction, alpha^2 sin^2 if isotropic.
-LUCH_FN void mask_ggx(float cos_o, float cos_i, float stretched_sin2_o, float stretched_sin2_i, Facets* f) {
-    float t_o = sqrt_f(sqr(cos_o) + stretched_sin2_o), t_i = sqrt_f(sqr(cos_i) + stretched_sin2_i);
-    float c_i = abs_f(cos_i);
-    f->g1 = 2.0f / (cos_o + t_o);
-    f->g2 = 2.0f * c_i / max_f(t_o * c_i + t_i * cos_o, 1e-30f);
-}
-LUCH_FN void mask_beckmann(float cos_o, float cos_i, float stretched_sin2_o, float stretched_sin2_i, Facets* f) {
-    float lambda_o = beckmann_lambda(stretched_sin2_o / sqr(cos_o));
-    float lambda_i = beckmann_lambda(stretched_sin2_i / max_f(sqr(cos_i), 1e-30f));
-    f->g1 = 1.0f / (cos_o * (1.0f + beckmann_lambda_exact(stretched_sin2_o / sqr(cos_o))));
-    f->g2 = 1.0f / (cos_o * (1.0f + lambda_o + lambda_i));
-}
-
 // How far the cap of visible normals can be cut without losing a reflection above the horizon.
 LUCH_FN float cap_bound(const Lobe& l, float cos_o) {
-    float a2 = sqr(min_f(l.alpha_x, l.alpha_y));
-    float s2 = sqr(1.0f + safe_sqrt(1.0f - sqr(cos_o)));
-    return (1.0f - a2) * s2 / (s2 + a2 * sqr(cos_o));
+    float a2 = sqr(min_f(l.alpha_x, l.alpha_y)), cos2 = sqr(cos_o);
+    float s2 = sqr(1.0f + safe_sqrt(1.0f - cos2));
+    return (1.0f - a2) * s2 / (s2 + a2 * cos2);
 }
 LUCH_FN bool uses_cap_bound(const Lobe& l) {
     return l.type == LobeType::MICROFACET_REFLECTION && l.distribution == Distribution::GGX;
 }
 
-// h_local: unit half vector on the normal's side.
-LUCH_FN Facets facets(const Lobe& l, Vec3 o, Vec3 i, Vec3 h) {
+LUCH_FN Facets facets(const Lobe& l, const FacetAngles& a) {
     Facets f;
-    float ax2 = sqr(l.alpha_x), ay2 = sqr(l.alpha_y);
-    // Refraction has no anisotropy: the mean roughness serves.
-    if (i.z < 0.0f) ax2 = ay2 = l.alpha_x * l.alpha_y;
-    float a2 = sqrt_f(ax2 * ay2);
-    float so = ax2 * sqr(o.x) + ay2 * sqr(o.y), si = ax2 * sqr(i.x) + ay2 * sqr(i.y);
+    float a2 = l.alpha_x * l.alpha_y;
     if (l.distribution == Distribution::GGX) {
-        float e = sqr(h.x) * (a2 / ax2) + sqr(h.y) * (a2 / ay2) + a2 * sqr(h.z);
-        f.density = a2 * INV_PI / sqr(e);
-        mask_ggx(o.z, i.z, so, si, &f);
-        if (uses_cap_bound(l)) f.g1 = 2.0f / (cap_bound(l, o.z) * o.z + sqrt_f(sqr(o.z) + so));
+        f.density = INV_PI / (a2 * sqr(a.sin2_h + sqr(a.cos_h)));
+        float t_o = sqrt_f(sqr(a.cos_o) + a.sin2_o), t_i = sqrt_f(sqr(a.cos_i) + a.sin2_i), c_i = abs_f(a.cos_i);
+        f.g1 = 2.0f / ((uses_cap_bound(l) ? cap_bound(l, a.cos_o) : 1.0f) * a.cos_o + t_o);
+        f.g2 = 2.0f * c_i / max_f(t_o * c_i + t_i * a.cos_o, 1e-30f);
     } else {
-        float z2 = max_f(sqr(h.z), 1e-20f);
-        f.density = exp_f(-(sqr(h.x) / ax2 + sqr(h.y) / ay2) / z2) * INV_PI / (a2 * sqr(z2));
-        mask_beckmann(o.z, i.z, so, si, &f);
+        float z2 = max_f(sqr(a.cos_h), 1e-20f), o2 = a.sin2_o / sqr(a.cos_o);
+        f.density = exp_f(-a.sin2_h / z2) * INV_PI / (a2 * sqr(z2));
+        float lambda_i = beckmann_lambda(a.sin2_i / max_f(sqr(a.cos_i), 1e-30f));
+        f.g1 = 1.0f / (a.cos_o * (1.0f + beckmann_lambda_exact(o2)));
+        f.g2 = 1.0f / (a.cos_o * (1.0f + beckmann_lambda(o2) + lambda_i));
     }
     return f;
 }
@@ -99,14 +103,19 @@ LUCH_FN_SLOW LobeValue eval_microfacet(const Lobe& l, Vec3 wo, Vec3 wi) {
     Vec3 h = through ? -(l.ior * wi + wo) : wi + wo;
     float inv_length = safe_divide(1.0f, length(h));
     h *= inv_length;
-    Frame frame = lobe_frame(l);
-    Vec3 h_local = to_local(h, frame);
+    FacetAngles angles;
+    if (is_anisotropic(l)) {
+        Frame frame = lobe_frame(l);
+        angles = facet_angles(l, to_local(wo, frame), to_local(wi, frame), to_local(h, frame));
+    } else {
+        angles = facet_angles_isotropic(l, h, cos_o, cos_i);
+    }
     float cos_ho = dot(h, wo), cos_hi = dot(h, wi);
     // The facet is seen by both from its right side, or no light takes this way.
-    if (through && !(cos_ho * h_local.z > 0.0f && cos_hi * h_local.z < 0.0f)) return no_value();
+    if (through && !(cos_ho * angles.cos_h > 0.0f && cos_hi * angles.cos_h < 0.0f)) return no_value();
     FresnelTerm fresnel = fresnel_term(l, abs_f(cos_ho));
-    float reflects = reflect_probability(fresnel);
-    Facets f = facets(l, to_local(wo, frame), to_local(wi, frame), h_local);
+    float reflects = can_transmit(l) ? reflect_probability(fresnel) : 1.0f;
+    Facets f = facets(l, angles);
     float common = f.density * (through ? sqr(l.ior * inv_length) * abs_f(cos_ho * cos_hi) : 0.25f);
     Color share = through ? fresnel.transmitted : fresnel.reflected;
     return {share * (common * f.g2 * l.energy_scale), common * f.g1 * (through ? 1.0f - reflects : reflects)};
@@ -118,7 +127,7 @@ LUCH_FN Vec3 sample_visible_ggx(const Lobe& l, Vec3 o, float bound, Vec2 u) {
     float low = bound * std_o.z;
     float z = (1.0f - u.y) * (1.0f + low) - low;
     float r = safe_sqrt(1.0f - z * z), sine, cosine;
-    sincos_f(TWO_PI * u.x, &sine, &cosine);
+    sincos_turns(u.x, &sine, &cosine);
     Vec3 h = make_vec3(r * cosine, r * sine, z) + std_o;
     return normalize_or(make_vec3(l.alpha_x * h.x, l.alpha_y * h.y, max_f(h.z, 0.0f)), make_vec3(0.0f, 0.0f, 1.0f));
 }
@@ -150,7 +159,7 @@ LUCH_FN_SLOW LobeSample sample_microfacet(const Lobe& l, Vec3 n_geometric, Vec3 
     s.eta = s.transmitted ? l.ior : 1.0f;
     s.f *= l.energy_scale;
     if (s.delta) return s;
-    Facets f = facets(l, o, i, h);
+    Facets f = facets(l, facet_angles(l, o, i, h));
     float common =
         f.density * (s.transmitted ? abs_f(cos_ho * fresnel.cos_t) / sqr(cos_ho * inv_ior - fresnel.cos_t) : 0.25f);
     s.f *= common * f.g2;

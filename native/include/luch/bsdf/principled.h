@@ -65,10 +65,10 @@ LUCH_FN Color layer_coat(ClosureSet& set, Color weight, const PrincipledSurface&
         lobe.ior = ior;
         lobe.fresnel = Fresnel::DIELECTRIC;
         make_isotropic(lobe, sqr(saturate_f(s.p.coat_roughness)));
-        weigh_by_albedo(lobe, s.c.wo);
+        Color reflected = weigh_by_albedo(lobe, s.c.wo);
         compensate_energy(lobe, s.c.wo, make_vec3(mean_fresnel_dielectric(ior)));
         add_lobe(set, lobe, s.c);
-        weight = weight_under(lobe.weight * lobe_albedo(lobe, s.c.wo).reflected, weight);
+        weight = weight_under(lobe.weight * reflected, weight);
     }
     Color tint = max_v(s.p.coat_tint, make_vec3(0.0f));
     if (tint.x == 1.0f && tint.y == 1.0f && tint.z == 1.0f) return weight;
@@ -135,10 +135,10 @@ LUCH_FN Color layer_specular(ClosureSet& set, Color weight, const PrincipledSurf
     lobe.c2 = make_vec3(0.0f);
     set_metal_roughness(lobe, s.roughness, saturate_f(s.p.anisotropic), s.p.anisotropic_rotation, s.p.tangent, s.n);
     set_film(lobe, s.film_thickness, s.film_ior);
-    weigh_by_albedo(lobe, s.c.wo);
+    Color reflected = weigh_by_albedo(lobe, s.c.wo);
     if (s.p.multiple_scattering) compensate_energy(lobe, s.c.wo, mean_fresnel_glass(lobe));
     add_lobe(set, lobe, s.c);
-    return weight_under(lobe.weight * lobe_albedo(lobe, s.c.wo).reflected, weight);
+    return weight_under(lobe.weight * reflected, weight);
 }
 
 LUCH_FN void base_diffuse(ClosureSet& set, Color weight, const PrincipledSurface& s) {

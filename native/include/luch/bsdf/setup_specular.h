@@ -25,10 +25,11 @@ LUCH_FN void compensate_energy(Lobe& lobe, Vec3 wo, Color mean_fresnel) {
     lobe.sample_weight *= average(darkening);
 }
 
-// Choosing a lobe should follow what it sends on.
-LUCH_FN void weigh_by_albedo(Lobe& lobe, Vec3 wo) {
+// Choosing a lobe should follow what it sends on. Returns the reflected share.
+LUCH_FN Color weigh_by_albedo(Lobe& lobe, Vec3 wo) {
     FresnelTerm albedo = lobe_albedo(lobe, wo);
     lobe.sample_weight *= average(albedo.reflected) + average(albedo.transmitted);
+    return albedo.reflected;
 }
 
 LUCH_FN void set_roughness(Lobe& lobe, float alpha_x, float alpha_y) {

@@ -8,14 +8,26 @@ namespace luch {
 inline constexpr float HALF_PI = 1.57079632679489661923f;
 inline constexpr float QUARTER_PI = 0.78539816339744830962f;
 
+// Sine and cosine of a number of turns in [0, 1]: no reduction of large angles is needed.
+LUCH_FN void sincos_turns(float turns, float* sine, float* cosine) {
+    float quarter = floor_f(4.0f * turns + 0.5f);
+    float rest = TWO_PI * (turns - 0.25f * quarter);  // within pi/4 of 0, and exact before the product
+    float s = sin_near_zero(rest), c = cos_near_zero(rest);
+    u32 n = static_cast<u32>(static_cast<i32>(quarter));
+    float a = (n & 1u) ? c : s, b = (n & 1u) ? s : c;
+    *sine = (n & 2u) ? -a : a;
+    *cosine = ((n + 1u) & 2u) ? -b : b;
+}
+
 // Uniform on the unit disk (Shirley and Chiu 1997). Density 1/pi.
 LUCH_FN Vec2 sample_disk(Vec2 u) {
     float a = 2.0f * u.x - 1.0f, b = 2.0f * u.y - 1.0f;
     bool wide = a * a > b * b;
     float r = wide ? a : b;
-    float ratio = safe_divide(wide ? b : a, r);  // the centre maps to itself: r = 0
-    float phi = wide ? QUARTER_PI * ratio : HALF_PI - QUARTER_PI * ratio;
-    return {r * cos_f(phi), r * sin_f(phi)};
+    // Within pi/4 of the nearer axis; the centre maps to itself: r = 0.
+    float angle = QUARTER_PI * safe_divide(wide ? b : a, r);
+    float along = r * cos_near_zero(angle), across = r * sin_near_zero(angle);
+    return {wide ? along : across, wide ? across : along};
 }
 
 // Uniform on the regular polygon inscribed in the unit circle, one edge facing `rotation`.
