@@ -17,6 +17,7 @@ struct EmitterBounds {
     float normals_rad;     // half angle of that cone: 0 for one direction, pi for all
     float emission_rad;    // how far from a normal light goes: pi/2 for a plain surface
     bool two_sided;        // light leaves along -normal too
+    bool omni;             // as strong in all directions
     float intensity;       // W/sr along a normal, luminance; > 0 and finite
 };
 

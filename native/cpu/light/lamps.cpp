@@ -135,6 +135,7 @@ EmitterBounds lamp_bounds(const LampView& lamp) {
     b.axis = lamp.direction;
     if (lamp.kind == LampKind::SPHERE || lamp.kind == LampKind::DISK) {
         b.intensity = lamp.delta ? strength : strength * PI * lamp.radius * lamp.radius;
+        b.omni = true;  // a spot within its cone
         b.normals_rad = lamp.spot ? 0.0f : PI;
         // A spot's cone starts anywhere on its ball; the box's own angle accounts for that.
         b.emission_rad = lamp.spot ? 2.0f * std::asin(std::sqrt(min_f(0.5f * lamp.spot_one_minus_cos, 1.0f))) : HALF_PI;

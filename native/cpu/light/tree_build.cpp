@@ -56,7 +56,8 @@ Cone merge(Cone a, Cone b) {
 struct Bounds {
     Vec3 low{1e38f, 1e38f, 1e38f}, high{-1e38f, -1e38f, -1e38f};
     Cone cone;
-    double intensity = 0.0;
+    double intensity = 0.0, omni = 0.0;
+    double mean[3] = {0.0, 0.0, 0.0};  // normals by intensity, sum
     u32 count = 0;
 };
 
@@ -66,6 +67,11 @@ void grow(Bounds* b, const Bounds& other) {
     b->high = max_v(b->high, other.high);
     b->cone = merge(b->cone, other.cone);
     b->intensity += other.intensity;
+    b->omni += other.omni;
+    // Two-sided normals have no sign of their own: add them on one side.
+    double along = b->mean[0] * other.mean[0] + b->mean[1] * other.mean[1] + b->mean[2] * other.mean[2];
+    double sign = other.cone.two_sided && along < 0.0 ? -1.0 : 1.0;
+    for (int i = 0; i < 3; ++i) b->mean[i] += sign * other.mean[i];
     b->count += other.count;
 }
 
@@ -76,6 +82,8 @@ Bounds bounds_of(const EmitterBounds& e) {
     b.cone = {e.axis, e.normals_rad, e.emission_rad, e.two_sided};
     b.intensity = e.intensity;
     b.count = 1;
+    b.omni = e.omni ? e.intensity : 0.0f;
+    for (int i = 0; i < 3; ++i) b.mean[i] = static_cast<double>(e.intensity) * e.axis[i];
     return b;
 }
 
@@ -133,7 +141,6 @@ class Builder {
             node.child[i] = NONE;
             node.axis_z[i] = 1.0f;
             node.fold[i] = 1.0f;
-            node.cos_normals[i] = -1.0f;
             node.cos_reach[i] = -2.0f;
         }
         return node;
@@ -232,8 +239,17 @@ class Builder {
         node->axis_x[i] = b.cone.axis.x;
         node->axis_y[i] = b.cone.axis.y;
         node->axis_z[i] = b.cone.axis.z;
-        node->cos_normals[i] = std::cos(b.cone.normals);
-        node->sin_normals[i] = std::sin(b.cone.normals);
+        double total = std::max(b.intensity, 1e-300);
+        float m[3], square = 0.0f;
+        for (int k = 0; k < 3; ++k) {
+            m[k] = static_cast<float>(b.mean[k] / total);
+            square += m[k] * m[k];
+        }
+        node->mean_x[i] = m[0];
+        node->mean_y[i] = m[1];
+        node->mean_z[i] = m[2];
+        node->spread[i] = max_f(1.0f - square, 0.0f);
+        node->omni[i] = static_cast<float>(b.omni / total);
         float reach = b.cone.normals + b.cone.emission;
         node->cos_reach[i] = reach >= PI ? -2.0f : std::cos(reach);
         node->fold[i] = b.cone.two_sided ? -1.0f : 1.0f;
