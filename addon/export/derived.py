@@ -43,7 +43,8 @@ def pointiness(positions: F32, normals: F32, edges: NDArray[np.int32]) -> F32:
     cosine = (normal * mean).sum(1) / np.maximum(degree, 1)
     sharp = np.where(degree > 0, np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi, 0.0)
     blurred = sharp + np.bincount(a, sharp[b], count) + np.bincount(b, sharp[a], count)
-    return (blurred / (degree + 1)).astype(np.float32)[place]
+    result: F32 = (blurred / (degree + 1)).astype(np.float32)[place]
+    return result
 
 
 def _edges(mesh: Any) -> NDArray[np.int32]:

@@ -297,6 +297,8 @@ struct Reader {
         auto aspect = py::cast<std::array<double, 2>>(film.attr("pixel_aspect"));
         std::copy(aspect.begin(), aspect.end(), frame.pixel_aspect);
         input.camera = cpu::make_camera_view(spec, frame, input.origin);
+        input.frame_width = u32(frame.width);
+        input.frame_height = u32(frame.height);
         store.set_camera(input.camera.to_camera, transform_point(input.camera.to_world, {0.0f, 0.0f, 0.0f}));
     }
 

@@ -129,7 +129,7 @@ void Batch::emission_of_samples(const u32* queue, const int* lanes, int count) {
         ShadePoints& points = scratch_->light_points;
         points.count = chosen_count;
         for (int i = 0; i < chosen_count; i++) setup_light_lane(queue[chosen[i]], chosen[i], points, i);
-        run_program(scene_.view, *program, points, scratch_->light_sets, aligned_registers_);
+        run_program(scene_.view, *program, points, scratch_->light_sets, aligned_registers_, nullptr, 0, Wanted::LIGHT);
         for (int i = 0; i < chosen_count; i++) scratch_->emission[chosen[i]] = scratch_->light_sets[i].emission;
     }
 }
@@ -189,7 +189,8 @@ Color Batch::eval_lamp(const PathState& path, const LampHit& hit, const Ray& ray
     in.transparent_depth = path.transparent_bounce;
     in.path = 0, in.seed = 0;
     setup_free_lane(in, hit.normal, points, 0);
-    run_program(scene_.view, lamp.program, points, scratch_->light_sets, aligned_registers_);
+    run_program(scene_.view, lamp.program, points, scratch_->light_sets, aligned_registers_, nullptr, 0,
+                Wanted::LIGHT);
     return scratch_->light_sets[0].emission;
 }
 
@@ -221,7 +222,8 @@ Color Batch::walk_transparent(const Ray& shadow, const PathState& path) {
         in.transparent_depth = passed;
         in.path = 0, in.seed = 0;
         setup_surface_lane(scene_.view, in, points, 0);
-        run_program(scene_.view, material.program, points, scratch_->light_sets, aligned_registers_);
+        run_program(scene_.view, material.program, points, scratch_->light_sets, aligned_registers_, nullptr, 0,
+                    Wanted::LIGHT);
         through *= scratch_->light_sets[0].transparent;
         if (!(max_component(through) > 0.0f)) return make_vec3(0.0f);
         Vec3 origin = offset_origin(spot.p, spot.error, lane_face_normal(points, 0), ray.direction);

@@ -45,6 +45,11 @@ Renderer::Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input)
     stats_.scene_bytes = store_->bytes();
     scene_.accel = accel_.get();
     scene_.camera = input_.camera;
+    scene_.view.camera = &scene_.camera;
+    scene_.view.frame_size = {float(input_.frame_width), float(input_.frame_height)};
+    scene_.view.origin = {float(input_.origin[0]), float(input_.origin[1]), float(input_.origin[2])};
+    scene_.view.flags = (input_.limits.caustics_reflective ? 0u : u32(SCENE_NO_REFLECTIVE_CAUSTICS)) |
+                        (input_.limits.caustics_refractive ? 0u : u32(SCENE_NO_REFRACTIVE_CAUSTICS));
     scene_.filter = input_.filter;
     scene_.limits = input_.limits;
     scene_.seed = input_.seed;

@@ -23,6 +23,7 @@ struct RenderInput {
     bool light_tree = true;
     AccelKind accel_kind = AccelKind::BVH;
     CameraView camera{};
+    u32 frame_width = 0, frame_height = 0;  // pixels of the full frame
     PixelFilter filter{};
     PathLimits limits{};
     FilmSpec film;
