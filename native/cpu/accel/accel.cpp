@@ -73,6 +73,7 @@ class TwoLevel final : public Accel {
     void build_top(const SceneView& scene, ThreadPool& pool);
     void count();
     NodeRay top_ray(Vec3 origin, Vec3 direction, float t_min) const;
+    bool enter(const Entry& entry, const Ray& ray, LaneRay* out) const;
     void closest_in_entry(const Entry& entry, const Ray& ray, Hit* hit) const;
     u8 any_in_entry(const Entry& entry, const Ray& ray) const;
     Hit closest_one(const Ray& ray, u32 kinds) const;
@@ -208,16 +209,24 @@ NodeRay TwoLevel::top_ray(Vec3 origin, Vec3 direction, float t_min) const {
     return NodeRay(make_box_ray(origin, direction, root_, error), t_min);
 }
 
-void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) const {
-    Vec3 origin = ray.origin, direction = ray.direction;
-    if (entry.instance != NONE) {
-        origin = transform_point(entry.to_object, origin);
-        direction = transform_direction(entry.to_object, direction);
-        if (!ray_is_valid({origin, 0.0f, direction, LARGEST})) return;
+// The ray as the entry's triangles see it; false if the transform leaves no ray.
+bool TwoLevel::enter(const Entry& entry, const Ray& ray, LaneRay* out) const {
+    if (entry.instance == NONE) {
+        *out = lane_ray(ray);
+        return true;
     }
+    Ray inside = {transform_point(entry.to_object, ray.origin), 0.0f,
+                  transform_direction(entry.to_object, ray.direction), LARGEST};
+    *out = lane_ray(inside);
+    return ray_is_valid(inside);
+}
+
+void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) const {
+    LaneRay inside;
+    if (!enter(entry, ray, &inside)) return;
     const Group& group = groups_[entry.group];
     GroupHit hit = {best->t, NONE, 0.0f, 0.0f};
-    closest_in_group(group, origin, direction, ray.t_min, &hit);
+    closest_in_group(group, inside, max_f(ray.t_min, 0.0f), &hit);
     if (hit.ref == NONE) return;
     const Member& member = group.member_of(hit.ref);
     u32 instance = entry.instance == NONE ? member.instance : entry.instance, prim = hit.ref - member.first_ref;
@@ -226,36 +235,28 @@ void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) c
 }
 
 u8 TwoLevel::any_in_entry(const Entry& entry, const Ray& ray) const {
-    if (entry.instance == NONE)
-        return any_in_group(groups_[entry.group], ray.origin, ray.direction, ray.t_min, ray.t_max);
-    Vec3 origin = transform_point(entry.to_object, ray.origin);
-    Vec3 direction = transform_direction(entry.to_object, ray.direction);
-    if (!ray_is_valid({origin, 0.0f, direction, LARGEST})) return BLOCKED_NOT;
-    return any_in_group(groups_[entry.group], origin, direction, ray.t_min, ray.t_max);
+    LaneRay inside;
+    if (!enter(entry, ray, &inside)) return BLOCKED_NOT;
+    return any_in_group(groups_[entry.group], inside, max_f(ray.t_min, 0.0f), min_f(ray.t_max, LARGEST));
 }
 
-Hit TwoLevel::closest_one(const Ray& given, u32 kinds) const {
+Hit TwoLevel::closest_one(const Ray& ray, u32 kinds) const {
     constexpr Hit MISS = {INFINITE_DISTANCE, NONE, NONE, 0.0f, 0.0f};
-    if (!ray_is_valid(given)) return MISS;
-    Ray ray = given;
-    ray.t_min = max_f(ray.t_min, 0.0f);
+    if (!ray_is_valid(ray)) return MISS;
     Hit best = {min_f(ray.t_max, LARGEST), NONE, NONE, 0.0f, 0.0f};
     auto visit = [&](u32 first, u32 count) {
         for (u32 e = first; e < first + count; ++e)
             if (entries_[e].visibility & kinds) closest_in_entry(entries_[e], ray, &best);
     };
     if (top_.size())
-        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, ray.t_min), &best.t, visit);
+        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), &best.t, visit);
     else
         visit(0, u32(entries_.size()));
     return best.prim == NONE ? MISS : best;
 }
 
-u8 TwoLevel::any_one(const Ray& given, u32 kinds) const {
-    if (!ray_is_valid(given)) return BLOCKED_NOT;
-    Ray ray = given;
-    ray.t_min = max_f(ray.t_min, 0.0f);
-    ray.t_max = min_f(ray.t_max, LARGEST);
+u8 TwoLevel::any_one(const Ray& ray, u32 kinds) const {
+    if (!ray_is_valid(ray)) return BLOCKED_NOT;
     u8 result = BLOCKED_NOT;
     auto visit = [&](u32 first, u32 count) {
         for (u32 e = first; e < first + count && result != BLOCKED_OPAQUE; ++e)
@@ -264,7 +265,7 @@ u8 TwoLevel::any_one(const Ray& given, u32 kinds) const {
         return result == BLOCKED_OPAQUE;
     };
     if (top_.size())
-        visit_any(top_.data(), top_ray(ray.origin, ray.direction, ray.t_min), ray.t_max, visit);
+        visit_any(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), ray.t_max, visit);
     else
         visit(0, u32(entries_.size()));
     return result;

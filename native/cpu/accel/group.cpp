@@ -10,13 +10,9 @@ namespace {
 bool is_closer(float t, u32 ref, const GroupHit& best) { return t < best.t || (t == best.t && ref < best.ref); }
 
 struct Rays {
-    TriangleRay triangle;
     NodeRay node;
     BlockRay block;
-    Rays(const Group& group, Vec3 origin, Vec3 direction, float t_min)
-        : triangle(make_triangle_ray(origin, direction)),
-          node(make_box_ray(origin, direction, group.root), t_min),
-          block(triangle, t_min) {}
+    Rays(const Group& group, const LaneRay& ray, float t_min) : node(ray, group.root, t_min), block(ray, t_min) {}
 };
 
 bool lane_hit(const Block4& block, u32 lane, const TriangleRay& ray, float t_min, float t_max, TriangleHit* hit) {
@@ -37,16 +33,16 @@ void for_each_hit(const Group& group, const TriangleRay& ray, float t_min, float
 
 }  // namespace
 
-void closest_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_min, GroupHit* best) {
+void closest_in_group(const Group& group, const LaneRay& ray, float t_min, GroupHit* best) {
     auto offer = [best](float t, u32 ref, float u, float v) {
         if (is_closer(t, ref & REF_MASK, *best)) *best = {t, ref & REF_MASK, u, v};
     };
     if (group.nodes.size() == 0) {
-        for_each_hit(group, make_triangle_ray(origin, direction), t_min, best->t,
+        for_each_hit(group, make_triangle_ray(ray.origin3(), ray.direction3()), t_min, best->t,
                      [&](const TriangleHit& hit, u32 ref) { offer(hit.t, ref, hit.u, hit.v); });
         return;
     }
-    Rays rays(group, origin, direction, t_min);
+    Rays rays(group, ray, t_min);
     visit_closest(group.nodes.data(), rays.node, &best->t, [&](u32 first, u32 count) {
         for (u32 b = first; b < first + count; ++b) {
             const Block4& block = group.blocks[b];
@@ -59,7 +55,7 @@ void closest_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_m
     });
 }
 
-u8 any_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_min, float t_max) {
+u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max) {
     u8 result = BLOCKED_NOT;
     auto note = [&result](u32 ref) {
         if (!(ref & REF_TRANSPARENT))
@@ -68,11 +64,11 @@ u8 any_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_min, fl
             result = BLOCKED_MAYBE;
     };
     if (group.nodes.size() == 0) {
-        for_each_hit(group, make_triangle_ray(origin, direction), t_min, t_max,
+        for_each_hit(group, make_triangle_ray(ray.origin3(), ray.direction3()), t_min, t_max,
                      [&](const TriangleHit&, u32 ref) { note(ref); });
         return result;
     }
-    Rays rays(group, origin, direction, t_min);
+    Rays rays(group, ray, t_min);
     visit_any(group.nodes.data(), rays.node, t_max, [&](u32 first, u32 count) {
         for (u32 b = first; b < first + count; ++b) {
             const Block4& block = group.blocks[b];

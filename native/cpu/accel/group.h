@@ -10,6 +10,8 @@
 
 namespace luch::cpu {
 
+struct LaneRay;  // traverse.h
+
 struct Member {
     u32 mesh;
     u32 instance;  // NONE: the mesh in its own space
@@ -37,8 +39,8 @@ void build_group(Group& group, const SceneView& scene, const std::vector<std::ve
                  ThreadPool& pool);
 
 // The ray in the group's space, valid, 0 <= t_min; hit->t its upper end.
-void closest_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_min, GroupHit* hit);
+void closest_in_group(const Group& group, const LaneRay& ray, float t_min, GroupHit* hit);
 // A Blocked value.
-u8 any_in_group(const Group& group, Vec3 origin, Vec3 direction, float t_min, float t_max);
+u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max);
 
 }  // namespace luch::cpu

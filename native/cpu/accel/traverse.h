@@ -6,33 +6,79 @@
 #include "cpu/accel/simd.h"
 #include "luch/geometry/box.h"
 #include "luch/geometry/triangle.h"
+#include "luch/math/bounds.h"
 
 namespace luch::cpu {
 
-// A ray against the boxes of one tree, spread over lanes.
+// A ray as two vectors; w is free.
+struct alignas(16) LaneRay {
+    float origin[4], direction[4];
+    f4 o() const { return load<f4>(origin); }
+    f4 d() const { return load<f4>(direction); }
+    Vec3 origin3() const { return {origin[0], origin[1], origin[2]}; }
+    Vec3 direction3() const { return {direction[0], direction[1], direction[2]}; }
+};
+
+// By two vector loads: piecewise copies would stall the vector loads that follow.
+LUCH_FN LaneRay lane_ray(const Ray& ray) {
+    static_assert(sizeof(Ray) == sizeof(LaneRay));
+    LaneRay out;
+    __builtin_memcpy(out.origin, &ray.origin, 16);
+    __builtin_memcpy(out.direction, &ray.direction, 16);
+    return out;
+}
+LUCH_FN f4 abs_of(f4 x) { return min_of(max_of(x, -x), splat<f4>(INFINITE_DISTANCE)); }
+
+// A ray against the boxes of one tree, spread over lanes: make_box_ray (box.h), three axes at a time.
 struct NodeRay {
     f8 near_origin[3], far_origin[3], near_rdir[3], far_rdir[3];
     f8 t_min;
-    u32 near_plane[3], far_plane[3];  // rows of Node8::bounds
+    u32 near_plane[3], far_plane[3];  // byte offsets of rows of Node8::bounds
 
-    NodeRay(const BoxRay& ray, float t_min_) : t_min(splat<f8>(t_min_)) {
+    NodeRay(const LaneRay& ray, const Box& root, float t_min_) : t_min(splat<f8>(t_min_)) {
+        f4 o = ray.o(), d = ray.d(), steep = abs_of(d);
+        float steepest = max_f(max_f(steep[0], steep[1]), steep[2]);
+        f4 slope = splat<f4>(SHEAR_ERROR * steepest);
+        if (mask_lt(steep, 4.0f * slope) & 7u) {  // parallel to some planes
+            spread(make_box_ray(ray.origin3(), ray.direction3(), root));
+            return;
+        }
+        f4 one = splat<f4>(1.0f);
+        alignas(16) float near_r[4], far_r[4];
+        *reinterpret_cast<f4*>(near_r) = one / (steep + slope) * SLAB_DOWN;
+        *reinterpret_cast<f4*>(far_r) = one / (steep - slope) * SLAB_UP;
+        for (u32 axis = 0; axis < 3; ++axis) {
+            near_origin[axis] = far_origin[axis] = splat<f8>(o[axis]);
+            near_rdir[axis] = splat<f8>(copysign_f(near_r[axis], d[axis]));
+            far_rdir[axis] = splat<f8>(copysign_f(far_r[axis], d[axis]));
+            choose_planes(axis, float_bits(d[axis]) >> 31);
+        }
+    }
+    NodeRay(const BoxRay& ray, float t_min_) : t_min(splat<f8>(t_min_)) { spread(ray); }
+
+ private:
+    void choose_planes(u32 axis, u32 negative) {
+        near_plane[axis] = 32 * (axis + 3 * negative);
+        far_plane[axis] = 32 * (axis + 3 * (1 - negative));
+    }
+    void spread(const BoxRay& ray) {
         for (u32 axis = 0; axis < 3; ++axis) {
             near_origin[axis] = splat<f8>(ray.near_origin[axis]);
             far_origin[axis] = splat<f8>(ray.far_origin[axis]);
             near_rdir[axis] = splat<f8>(ray.near_rdir[axis]);
             far_rdir[axis] = splat<f8>(ray.far_rdir[axis]);
-            near_plane[axis] = axis + 3 * ray.negative[axis];
-            far_plane[axis] = axis + 3 * (1 - ray.negative[axis]);
+            choose_planes(axis, ray.negative[axis]);
         }
     }
 };
 
 // Bits of the children that the ray may hit before t_max, and where it enters them.
 LUCH_FN u32 intersect_node(const Node8& node, const NodeRay& r, float t_max, f8* entry) {
+    const char* bounds = reinterpret_cast<const char*>(node.bounds);
     f8 near_t[3], far_t[3];
     for (int axis = 0; axis < 3; ++axis) {
-        near_t[axis] = (load<f8>(node.bounds[r.near_plane[axis]]) - r.near_origin[axis]) * r.near_rdir[axis];
-        far_t[axis] = (load<f8>(node.bounds[r.far_plane[axis]]) - r.far_origin[axis]) * r.far_rdir[axis];
+        near_t[axis] = (load<f8>(bounds + r.near_plane[axis]) - r.near_origin[axis]) * r.near_rdir[axis];
+        far_t[axis] = (load<f8>(bounds + r.far_plane[axis]) - r.far_origin[axis]) * r.far_rdir[axis];
     }
     // 0 * inf, a ray in a face's plane, is NaN. The order drops it (at worst with its neighbour): the test
     // then says yes where it need not.
@@ -42,22 +88,34 @@ LUCH_FN u32 intersect_node(const Node8& node, const NodeRay& r, float t_max, f8*
     return mask_le(enter, leave);
 }
 
-// A ray against triangle blocks: the shear of triangle.h, spread over lanes.
+// A ray against triangle blocks: make_triangle_ray (triangle.h), spread over lanes.
 struct BlockRay {
     f4 origin[3];  // by shear axis: x, y, z
     f4 shear_x, shear_y, scale_z;
     double scale_z_exact;
     float t_min;
-    int axis[3];
+    u32 axis[3];  // byte offsets of rows within a vertex of Block4
 
-    BlockRay(const TriangleRay& r, float t_min_)
-        : origin{splat<f4>(r.origin[r.kx]), splat<f4>(r.origin[r.ky]), splat<f4>(r.origin[r.kz])},
-          shear_x(splat<f4>(r.shear_x)),
-          shear_y(splat<f4>(r.shear_y)),
-          scale_z(splat<f4>(r.scale_z)),
-          scale_z_exact(r.scale_z_exact),
-          t_min(t_min_),
-          axis{r.kx, r.ky, r.kz} {}
+    BlockRay(const LaneRay& ray, float t_min_) : t_min(t_min_) {
+        const float* d = ray.direction;
+        f4 steep = abs_of(ray.d());
+        u32 kz = steep[1] > steep[0] ? 1 : 0;
+        kz = steep[2] > max_f(steep[0], steep[1]) ? 2 : kz;
+        float dz = d[kz];
+        // Which axes are x and y, by z's axis and sign: no branch, random rays would mispredict it.
+        static constexpr u8 X[8] = {1, 2, 0, 0, 2, 0, 1, 0}, Y[8] = {2, 0, 1, 0, 1, 2, 0, 0};
+        u32 kind = kz + 4 * (float_bits(dz) >> 31), kx = X[kind], ky = Y[kind];
+        axis[0] = 16 * kx;
+        axis[1] = 16 * ky;
+        axis[2] = 16 * kz;
+        origin[0] = splat<f4>(ray.origin[kx]);
+        origin[1] = splat<f4>(ray.origin[ky]);
+        origin[2] = splat<f4>(ray.origin[kz]);
+        shear_x = splat<f4>(d[kx] / dz);
+        shear_y = splat<f4>(d[ky] / dz);
+        scale_z = splat<f4>(1.0f / dz);
+        scale_z_exact = 1.0 / double(dz);
+    }
 };
 
 struct BlockHits {
@@ -69,9 +127,10 @@ struct BlockHits {
 LUCH_FN u32 intersect_block(const Block4& block, const BlockRay& r, float t_max, BlockHits* hits) {
     f4 x[3], y[3], z[3];
     for (int k = 0; k < 3; ++k) {
-        z[k] = load<f4>(block.vertex[k][r.axis[2]]) - r.origin[2];
-        x[k] = (load<f4>(block.vertex[k][r.axis[0]]) - r.origin[0]) - r.shear_x * z[k];
-        y[k] = (load<f4>(block.vertex[k][r.axis[1]]) - r.origin[1]) - r.shear_y * z[k];
+        const char* vertex = reinterpret_cast<const char*>(block.vertex[k]);
+        z[k] = load<f4>(vertex + r.axis[2]) - r.origin[2];
+        x[k] = (load<f4>(vertex + r.axis[0]) - r.origin[0]) - r.shear_x * z[k];
+        y[k] = (load<f4>(vertex + r.axis[1]) - r.origin[1]) - r.shear_y * z[k];
     }
     // Rounding is monotone, so a float edge function is zero or has the right sign (or overflowed to NaN).
     f4 u = x[2] * y[1] - y[2] * x[1];
