@@ -29,9 +29,9 @@ LUCH_FN PrincipledSurface read_principled(const PrincipledParams& p, const Setup
     Vec3 n = closure_normal(p.normal, c);
     Vec3 coat_n = is_zero(p.coat_normal) ? n : closure_normal(p.coat_normal, c);
     Color base = max_v(p.base_color, none);
-    float film_ior = p.thin_film_thickness > FILM_MIN_THICKNESS_NM ? max_f(p.thin_film_ior, 1e-5f) : 0.0f;
+    float film_ior = p.thin_film_thickness > FILM_MIN_THICKNESS_NM ? valid_ior(p.thin_film_ior) : 0.0f;
     return {p, c, n, specular_normal(n, c), coat_n, base, min_v(base, make_vec3(1.0f)), max_v(p.specular_tint, none),
-            max_f(p.ior, 1e-5f), saturate_f(p.roughness), p.thin_film_thickness, film_ior};
+            valid_ior(p.ior), saturate_f(p.roughness), p.thin_film_thickness, film_ior};
 }
 
 LUCH_FN Color layer_sheen(ClosureSet& set, Color weight, const PrincipledSurface& s) {
@@ -57,7 +57,7 @@ LUCH_FN Color coat_absorption(Color tint, float ior, float amount, float cos_i) 
 LUCH_FN Color layer_coat(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float amount = max_f(s.p.coat_weight, 0.0f);
     if (!(amount > LOBE_WEIGHT_CUTOFF)) return weight;
-    float ior = max_f(s.p.coat_ior, 1.0f);
+    float ior = clamp_f(s.p.coat_ior, 1.0f, 1e6f);
     Vec3 n = specular_normal(s.coat_n, s.c);
     Lobe lobe;
     if (allows_reflective_caustics(s.c) &&

@@ -6,6 +6,9 @@
 
 namespace luch {
 
+// Indices whose squares still fit a float with room for products; NaN: the smallest.
+LUCH_FN float valid_ior(float ior) { return clamp_f(ior, 1e-5f, 1e6f); }
+
 // Puts back the light that one bounce between facets loses. mean_fresnel: mean reflectance of one
 // bounce over the hemisphere; the bounces beyond the first are tinted by it.
 // Source: Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks", appendix.
@@ -61,7 +64,7 @@ LUCH_FN void set_metal_roughness(Lobe& lobe, float roughness, float anisotropy, 
 
 LUCH_FN void set_film(Lobe& lobe, float thickness_nm, float film_ior) {
     lobe.thin_film_thickness = thickness_nm;
-    lobe.thin_film_ior = max_f(film_ior, 1e-5f);
+    lobe.thin_film_ior = valid_ior(film_ior);
 }
 
 LUCH_FN_SLOW void setup_glossy(ClosureSet& set, Color weight, const GlossyParams& p, const SetupContext& c) {
@@ -120,7 +123,7 @@ LUCH_FN_SLOW void setup_refraction(ClosureSet& set, Color weight, const Refracti
     Vec3 n = specular_normal(closure_normal(p.normal, c), c);
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::MICROFACET_REFRACTION, weight * p.color, n, c)) return;
-    float ior = max_f(p.ior, 1e-5f);
+    float ior = valid_ior(p.ior);
     lobe.ior = c.path_flags & PATH_BACKFACING ? 1.0f / ior : ior;
     make_isotropic(lobe, sqr(p.roughness));
     if (p.distribution == Microfacets::BECKMANN) lobe.distribution = Distribution::BECKMANN;
@@ -160,7 +163,7 @@ LUCH_FN_SLOW void setup_glass(ClosureSet& set, Color weight, const GlassParams& 
     Vec3 n = specular_normal(closure_normal(p.normal, c), c);
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::MICROFACET_GLASS, weight, n, c)) return;
-    float ior = max_f(p.ior, 1e-5f);
+    float ior = valid_ior(p.ior);
     Color color = max_v(p.color, none);
     set_film(lobe, p.thin_film_thickness, p.thin_film_ior);
     GlassTints tints = {make_vec3(f0_from_ior(ior)), reflects ? color : none, refracts ? color : none};
