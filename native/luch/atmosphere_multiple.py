@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
+Floats = NDArray[np.floating]
 Densities = tuple[float, float, float]  # air, aerosol, ozone, relative to Earth's
 
 EARTH_RADIUS_KM = 6371.0
@@ -70,7 +71,7 @@ def _sun(cosine: float) -> F32:
     return np.array([-np.sqrt(max(1.0 - cosine * cosine, 0.0)), 0.0, cosine], np.float32)
 
 
-def _distance_to_sphere(r: float | F32, cosine: F32, radius: float) -> F32:
+def _distance_to_sphere(r: float | Floats, cosine: Floats, radius: float) -> F32:
     """Along a ray that starts at distance r from the centre; negative where it misses."""
     r = np.asarray(r, np.float64)
     b = r * cosine.astype(np.float64)
@@ -95,7 +96,7 @@ def _coefficients(altitude: F32, densities: Densities) -> tuple[F32, F32, F32]:
     return by_air.astype(np.float32), by_aerosol.astype(np.float32), extinction.astype(np.float32)
 
 
-def _transmittance(cosine: F32, altitude: F32, densities: Densities) -> F32:
+def _transmittance(cosine: F32, altitude: Floats, densities: Densities) -> F32:
     """From altitudes out of the atmosphere towards the sun; (N,) each -> (N, 4)."""
     r = altitude.astype(np.float64) + EARTH_RADIUS_KM
     step = _distance_to_sphere(r, cosine, EARTH_RADIUS_KM + THICKNESS_KM) / np.float32(STEPS)

@@ -101,7 +101,13 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         remaining = seconds * (1.0 - fraction) / fraction if fraction > 0.0 else float("inf")
         return progress(
             Progress(
-                first, total, min(fraction, 1.0), seconds, max(remaining, 0.0), peak_memory_bytes(), new_picture,
+                first,
+                total,
+                min(fraction, 1.0),
+                seconds,
+                max(remaining, 0.0),
+                peak_memory_bytes(),
+                new_picture,
                 renderer.passes,
             )
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import bpy
 import numpy as np
@@ -43,13 +44,11 @@ def map_vector(c: Compiler, vector: Vector, mapping: bpy.types.TexMapping) -> Ve
 
 def mapping_matrix(mapping: bpy.types.TexMapping) -> NDArray[np.float64]:
     """The (3, 4) matrix of a Texture Mapping."""
-    from mathutils import Euler
-
     kind = mapping.vector_type
     scale = np.array(mapping.scale, np.float64)
     if kind in ("TEXTURE", "NORMAL"):  # these divide
         scale = np.where(np.abs(scale) < 1e-5, np.copysign(1e-5, scale), scale)
-    linear = np.array(Euler(mapping.rotation).to_matrix(), np.float64)
+    linear = np.array(mapping.rotation.to_matrix(), np.float64)
     linear = linear @ np.diag(1.0 / scale if kind == "NORMAL" else scale)
     offset = np.zeros(3) if kind in ("VECTOR", "NORMAL") else np.array(mapping.translation, np.float64)
     if kind == "TEXTURE":
@@ -240,7 +239,8 @@ def sky_texture(c: Compiler, node: bpy.types.ShaderNodeTexSky) -> Outputs:
         return {"Color": c.builder.op3("SKY_ATMOSPHERE", vector, (table,))}
     if kind == "HOSEK_WILKIE":
         c.warn(node, "uses the Preetham sky in place of Hosek/Wilkie; choose Multiple Scattering for a better sky")
-    table = c.builder.table(sky.preetham_table(tuple(node.sun_direction), node.turbidity))
+    direction: Any = node.sun_direction
+    table = c.builder.table(sky.preetham_table(tuple(direction), node.turbidity))
     return {"Color": c.builder.op3("SKY_PREETHAM", vector, (table,))}
 
 

@@ -35,7 +35,7 @@ from luch.shader import ProgramBuilder, Value, Vector, float_word
 
 Output = Value | Vector
 Outputs = dict[str, Output]
-Emitter = Callable[["Compiler", bpy.types.Node], Outputs]
+Emitter = Callable[["Compiler", Any], Outputs]
 ClosureEmitter = Callable[["Compiler", bpy.types.Node, Vector], None]
 
 EMITTERS: dict[str, Emitter] = {}
