@@ -8,9 +8,8 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+from luch import cryptomatte
 from luch.scene import F32, Film, Scene
-
-from . import cryptomatte
 
 
 class ResultWriter:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from luch import __version__
+from luch import __version__, cryptomatte
 from luch.scene import Scene
 from luch.scenefile import read_scene
 
@@ -90,7 +90,7 @@ def _render(options: argparse.Namespace) -> int:
     if suffix == ".png":
         image.write_png(options.output, result.passes["Combined"], metadata=_statistics(result))
     else:
-        metadata = {**_statistics(result), "luch.scene": scene.name, **_cryptomatte(scene, "ViewLayer")}
+        metadata = {**_statistics(result), "luch.scene": scene.name, **cryptomatte.metadata(scene, "ViewLayer")}
         image.write_exr(options.output, result.passes, metadata=metadata)
     seconds = result.stats.get("render_seconds", 0.0)
     print(f"{options.output}: {result.stats.get('samples', 0)} samples in {seconds:.2f} s")
@@ -119,28 +119,6 @@ def _statistics(result: Result) -> dict[str, str | int | float]:
             fields[f"luch.{key}"] = value
         else:
             fields[f"luch.{key}"] = json.dumps(value, default=str)
-    return fields
-
-
-def _cryptomatte(scene: Scene, layer: str) -> dict[str, str]:
-    """Header fields by which compositors find the names behind cryptomatte's ids."""
-    from luch.cryptomatte import manifest, name_to_hash
-
-    names = {
-        "Object": [o.name for o in scene.objects],
-        "Material": [m.name for m in scene.materials],
-        "Asset": [o.asset for o in scene.objects],
-    }
-    fields: dict[str, str] = {}
-    for kind, members in names.items():
-        if not any(name.startswith(f"Crypto{kind}") for name in scene.film.passes):
-            continue
-        title = f"{layer}.Crypto{kind}"
-        prefix = f"cryptomatte/{name_to_hash(title):08x}"[:-1]  # seven digits
-        fields[f"{prefix}/name"] = title
-        fields[f"{prefix}/hash"] = "MurmurHash3_32"
-        fields[f"{prefix}/conversion"] = "uint32_to_float32"
-        fields[f"{prefix}/manifest"] = json.dumps(manifest(sorted(set(members))), ensure_ascii=False)
     return fields
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import struct
+from collections.abc import Iterable
+
+from luch.scene import Scene
 
 
 def _rotate(x: int, bits: int) -> int:
@@ -37,6 +41,27 @@ def name_to_id(name: str) -> float:
     return float(struct.unpack("<f", struct.pack("<I", name_to_hash(name)))[0])
 
 
-def manifest(names: list[str]) -> dict[str, str]:
-    """Name -> eight hex digits, as the EXR header holds it."""
-    return {name: f"{name_to_hash(name):08x}" for name in names}
+def manifest(names: Iterable[str]) -> str:
+    """JSON that maps names to eight hex digits, as a compositor reads it."""
+    return json.dumps({name: f"{name_to_hash(name):08x}" for name in sorted(set(names))}, ensure_ascii=False)
+
+
+def metadata(scene: Scene, layer: str) -> dict[str, str]:
+    """EXR header fields of every cryptomatte among the film's passes. layer: name of the view layer."""
+    fields: dict[str, str] = {}
+    for kind in ("Object", "Material", "Asset"):
+        if f"Crypto{kind}00" not in scene.film.passes:
+            continue
+        title = f"{layer}.Crypto{kind}"
+        prefix = f"cryptomatte/{murmur3_32(title.encode()):08x}"[:-1]  # seven digits
+        fields[f"{prefix}/name"] = title
+        fields[f"{prefix}/hash"] = "MurmurHash3_32"
+        fields[f"{prefix}/conversion"] = "uint32_to_float32"
+        fields[f"{prefix}/manifest"] = manifest(_names(scene, kind))
+    return fields
+
+
+def _names(scene: Scene, kind: str) -> list[str]:
+    if kind == "Material":
+        return [material.name for material in scene.materials]
+    return [subject.asset if kind == "Asset" else subject.name for subject in scene.objects]
