@@ -17,6 +17,8 @@ from .result import ResultWriter
 # Statistics of the last render of each scene, by its name: what panels, scripts and tests read.
 last_stats: dict[str, dict[str, Any]] = {}
 
+PREVIEW_SAMPLES = 32  # of material and light icons
+
 # Takes the exported scene instead of the renderer, while capture_scene waits for it.
 _receiver: Callable[[Scene], None] | None = None
 
@@ -52,6 +54,8 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         reporter = Reporter(self, depsgraph.scene)
         reporter.say("Exporting scene")
         scene = export.export_scene(depsgraph, self, cache=self._mesh_cache(depsgraph))
+        if self.is_preview:
+            scene.settings.samples = min(scene.settings.samples, PREVIEW_SAMPLES)
         reporter.warn(scene.warnings)
         if _receiver is not None:
             _receiver(scene)
@@ -64,12 +68,12 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         writer.stamp(stats, scene)
 
     def _mesh_cache(self, depsgraph: Any) -> MeshCache:
-        """The meshes of the frame before, if the user wants them kept; Blender then keeps this engine too."""
+        """The view layer's meshes of the frame before, if the user wants them kept; Blender then keeps this engine."""
         if not depsgraph.scene.render.use_persistent_data:
             return MeshCache()
-        if not hasattr(self, "_cache"):
-            self._cache = MeshCache()
-        return self._cache
+        if not hasattr(self, "_caches"):
+            self._caches: dict[str, MeshCache] = {}
+        return self._caches.setdefault(depsgraph.view_layer.name, MeshCache())
 
 
 def capture_scene(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Scene:

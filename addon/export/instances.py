@@ -28,8 +28,6 @@ def export_instances(context: ExportContext, cache: MeshCache) -> None:
     for item in context.depsgraph.object_instances:
         if item.show_self:
             collector.add(item)
-        if item.show_particles:
-            collector.warn_about_hair(item.object)
     collector.finish()
 
 
@@ -63,8 +61,14 @@ class InstanceCollector:
                 f'Object "{subject.name}" is {NOT_SUPPORTED[kind]}, which Luch does not draw yet: it is left out.'
             )
 
-    def warn_about_hair(self, subject: Any) -> None:
-        """Particle hair hides in its object's modifiers; say that it is missing."""
+    def _warn_about_what_is_missing(self, subject: Any) -> None:
+        """Say which properties of an object change nothing yet."""
+        if subject.is_shadow_catcher and subject.type != "LIGHT":  # of lamps Blender sets it by itself
+            self._context.warn(f'Object "{subject.name}" is a shadow catcher; Luch draws it as an ordinary object.')
+        linking = subject.light_linking
+        if linking.receiver_collection is not None or linking.blocker_collection is not None:
+            self._context.warn(f'Object "{subject.name}" uses light linking; Luch lights everything by every light.')
+        # Particle hair hides in its object's modifiers.
         if any(
             system.settings.type == "HAIR" and system.settings.render_type == "PATH"
             for system in subject.particle_systems
@@ -139,8 +143,7 @@ class InstanceCollector:
                 asset=asset_name(parent),
             )
         )
-        if subject.is_shadow_catcher:
-            self._context.warn(f'Object "{subject.name}" is a shadow catcher; Luch draws it as an ordinary object.')
+        self._warn_about_what_is_missing(subject)
         return len(result.objects) - 1
 
     def _view_layer(self) -> Any:
@@ -174,6 +177,7 @@ class InstanceCollector:
             return
         seed = item.random_id if item.is_instance else name_hash(subject.name)
         random = (seed & 0xFFFFFFFF) / 0xFFFFFFFF
+        self._warn_about_what_is_missing(subject)
         light = export_light(subject, rows.astype(np.float64), random, visibility, self._context)
         if np.isfinite([light.power, *light.color]).all():
             self._context.result.lights.append(light)

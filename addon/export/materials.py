@@ -8,6 +8,9 @@ from .attributes import wishes
 from .context import ExportContext
 from .nodes import compile_material
 
+# What an empty slot is called in Cryptomatte's manifest by every engine of Blender.
+DEFAULT_NAME = "default_surface"
+
 
 class MaterialTable:
     """Indices into `Scene.materials`, by Blender material."""
@@ -36,6 +39,8 @@ class MaterialTable:
         if index is None:
             index = self._indices[key] = len(self._context.result.materials)
             compiled = compile_material(material, self._context)
+            if material is None:
+                compiled.name = DEFAULT_NAME
             self._context.result.materials.append(compiled)
             self._wishes.append(wishes(compiled.surface))
         return index

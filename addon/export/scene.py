@@ -31,6 +31,7 @@ def export_scene(
     context = ExportContext(depsgraph, result)
     cache = cache or MeshCache()
     cache.begin(depsgraph)
+    _warn_about_what_is_missing(context)
     result.camera = export_camera(_camera(context, engine), context, engine)
     result.film = export_film(context, (engine.resolution_x, engine.resolution_y) if engine else None)
     result.settings = export_settings(context)
@@ -38,6 +39,15 @@ def export_scene(
     export_instances(context, cache)
     result.origin = _origin(result)
     return result
+
+
+def _warn_about_what_is_missing(context: ExportContext) -> None:
+    """Say which settings of the scene change nothing yet."""
+    render = context.scene.render
+    if render.use_motion_blur and context.view_layer.use_motion_blur:
+        context.warn(f'Scene "{context.scene.name}" has motion blur, which Luch does not draw yet: the frame is sharp.')
+    if render.use_multiview:
+        context.warn(f'Scene "{context.scene.name}" is stereoscopic; Luch draws every view from the same camera.')
 
 
 def _camera(context: ExportContext, engine: Any) -> Any:

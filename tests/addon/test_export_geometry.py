@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from luch.scene import Mesh, Scene
+from support.objects import grid_of_instances
 
 from addon.export import export_scene
 from addon.export.cache import MeshCache
@@ -140,28 +141,6 @@ def test_collection_instances_are_multiplied_by_their_instancer(scene: bpy.types
     assert result.instances is not None
     assert len(result.instances.object) == 1
     np.testing.assert_allclose(result.instances.matrix[0, :, 3], (-1.0, 0.0, 0.0), atol=1e-6)
-
-
-def grid_of_instances(count: int) -> bpy.types.Object:
-    """A geometry-nodes object that shows a cube on every point of a grid of count x count."""
-    group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    nodes, links = group.nodes, group.links
-    grid = nodes.new("GeometryNodeMeshGrid")
-    grid.inputs["Vertices X"].default_value = count
-    grid.inputs["Vertices Y"].default_value = count
-    grid.inputs["Size X"].default_value = count - 1.0
-    grid.inputs["Size Y"].default_value = count - 1.0
-    cube = nodes.new("GeometryNodeMeshCube")
-    scatter = nodes.new("GeometryNodeInstanceOnPoints")
-    output = nodes.new("NodeGroupOutput")
-    links.new(grid.outputs["Mesh"], scatter.inputs["Points"])
-    links.new(cube.outputs["Mesh"], scatter.inputs["Instance"])
-    links.new(scatter.outputs["Instances"], output.inputs[0])
-    bpy.ops.mesh.primitive_plane_add()
-    owner = bpy.context.object
-    owner.modifiers.new("Scatter", "NODES").node_group = group
-    return owner
 
 
 def test_geometry_nodes_instances_share_a_mesh_and_differ_in_random(scene: bpy.types.Scene) -> None:
