@@ -7,6 +7,7 @@ from typing import Any
 from .attributes import wishes
 from .context import ExportContext
 from .nodes import compile_material
+from .volumes import clear_surface, is_only_volume, warn_about_volume
 
 # What an empty slot is called in Cryptomatte's manifest by every engine of Blender.
 DEFAULT_NAME = "default_surface"
@@ -41,6 +42,10 @@ class MaterialTable:
             compiled = compile_material(material, self._context)
             if material is None:
                 compiled.name = DEFAULT_NAME
+            else:
+                warn_about_volume("Material", material, self._context)
+            if is_only_volume(material):
+                compiled.surface = clear_surface()
             self._context.result.materials.append(compiled)
             self._wishes.append(wishes(compiled.surface))
         return index

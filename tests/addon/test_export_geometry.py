@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from luch.scene import Mesh, Scene
+from luch.shader import TRANSPARENT
 from support.objects import grid_of_instances
 
 from addon.export import export_scene
@@ -194,6 +195,19 @@ def test_slots_show_their_materials_and_a_slot_of_the_object_wins(scene: bpy.typ
     result = export()
     assert [result.materials[index].name for index in result.objects[0].materials] == ["Data", "Own"]
     assert sorted(result.meshes[0].material_slots) == [0] * 10 + [1] * 2
+
+
+def test_a_volume_is_named_and_its_surface_lets_light_pass(scene: bpy.types.Scene) -> None:
+    bpy.ops.mesh.primitive_cube_add()
+    fog = bpy.data.materials.new("Fog")
+    fog.node_tree.nodes.clear()
+    scatter = fog.node_tree.nodes.new("ShaderNodeVolumeScatter")
+    output = fog.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    fog.node_tree.links.new(scatter.outputs[0], output.inputs["Volume"])
+    bpy.context.object.data.materials.append(fog)
+    result = export()
+    assert result.warnings == ['Material "Fog" has a volume, which Luch does not draw yet: light passes it unchanged.']
+    assert result.materials[0].surface.flags & TRANSPARENT
 
 
 def test_a_material_override_replaces_every_material(scene: bpy.types.Scene) -> None:
