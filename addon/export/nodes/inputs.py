@@ -62,6 +62,13 @@ def rgb(c: Compiler, node: bpy.types.Node) -> Outputs:
     return {"Color": c.builder.vector(red, green, blue)}
 
 
+@emitter("FunctionNodeInputVector")
+def vector(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Vector: what Blender leaves of a Combine XYZ whose inputs are constant."""
+    x, y, z = tuple(node.vector)[:3]
+    return {"Vector": c.builder.vector(x, y, z)}
+
+
 @emitter("ShaderNodeTexCoord")
 def texture_coordinate(c: Compiler, node: bpy.types.Node) -> Outputs:
     """Texture Coordinate, of the object itself, of another one, or of the instancer."""

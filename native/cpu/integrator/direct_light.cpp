@@ -13,22 +13,11 @@ namespace {
 // of the distance beyond the error of the point itself.
 constexpr float LIGHT_SHORTENING = 1e-5f;
 
-// Below this every microfacet lobe is sampled as a mirror.
-constexpr float MIRROR_ALPHA = 1e-4f;
-
 Color only(BsdfValue& value, u32 visibility) {
     if (!(visibility & RAY_DIFFUSE)) value.diffuse = make_vec3(0.0f);
     if (!(visibility & RAY_GLOSSY)) value.glossy = make_vec3(0.0f);
     if (!(visibility & RAY_TRANSMISSION)) value.transmission = make_vec3(0.0f);
     return total(value);
-}
-
-// False when all lobes are mirrors: no sampled light direction can match them.
-bool has_smooth_lobe(const ClosureSet& set) {
-    for (int i = 0; i < set.count; i++) {
-        if (is_diffuse(set.lobes[i].type) || max_f(set.lobes[i].alpha_x, set.lobes[i].alpha_y) > MIRROR_ALPHA) return true;
-    }
-    return false;
 }
 
 Color share(Color part, Color whole) {

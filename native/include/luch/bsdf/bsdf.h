@@ -178,6 +178,17 @@ LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 wo) {
     return value;
 }
 
+// Whether a direction from elsewhere can find a lobe: mirrors can only be sampled.
+LUCH_FN bool has_smooth_lobe(const ClosureSet& set) {
+    for (int i = 0; i < set.count; ++i) {
+        const Lobe& lobe = set.lobes[i];
+        if (lobe.type == LobeType::ASHIKHMIN_SHIRLEY ? !is_phong_mirror(lobe)
+                                                     : lobe.type < LobeType::MICROFACET_REFLECTION || !is_mirror(lobe))
+            return true;
+    }
+    return false;
+}
+
 // Mean normal of the lobes by weight: the Denoising Normal pass.
 LUCH_FN Vec3 shading_normal(const ClosureSet& set, Vec3 fallback) {
     Vec3 sum = make_vec3(0.0f);

@@ -49,7 +49,8 @@ LUCH_FN bool start_lobe(Lobe& lobe, LobeType type, Color weight, Vec3 normal, co
     u32 flags = !bumped ? 0u : (c.bump_correction ? LOBE_BUMPED | LOBE_SOFTENED : u32(LOBE_BUMPED));
     lobe.flags = static_cast<u8>(flags);
     lobe.normal = normal;
-    lobe.energy_scale = 1.0f;
+    lobe.alpha_x = lobe.alpha_y = 1.0f;
+    lobe.ior = lobe.energy_scale = 1.0f;
     lobe.thin_film_thickness = 0.0f;
     return true;
 }
