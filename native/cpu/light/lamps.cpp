@@ -54,9 +54,10 @@ void make_point(const LampInput& in, LampView* lamp) {
     lamp->kind = in.soft_falloff ? LampKind::DISK : LampKind::SPHERE;
     lamp->delta = lamp->radius < SMALLEST_RADIUS;
     if (lamp->delta) lamp->radius = 0.0f;
-    // Normalised: the sphere's whole flux is `power` (pi times radiance times area). Otherwise a radiance.
-    float per_area = in.normalize ? 0.25f / (PI * lamp->radius * lamp->radius) : 1.0f;
-    lamp->radiance = scaled_color(in, INV_PI * (lamp->delta ? 0.25f : per_area));
+    // Normalised: the sphere's whole flux is `power` (pi times radiance times area). Otherwise power / pi is the
+    // radiance, and of a lamp of no size, as in Cycles, the intensity.
+    float per_area = lamp->delta ? 0.25f : 0.25f / (PI * lamp->radius * lamp->radius);
+    lamp->radiance = scaled_color(in, INV_PI * (in.normalize ? per_area : 1.0f));
     if (in.shape == LampShape::SPOT) set_spot(in, lamp);
 }
 

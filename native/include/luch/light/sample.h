@@ -213,13 +213,15 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
 
 LUCH_FN_SLOW float pdf_triangle(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, u32 instance, u32 prim,
                                 Vec3 direction, float distance) {
-    (void)direction;
     const LightsView& lights = *scene.lights;
     if (lights.emitter_count == 0u || lights.instance_emitters[instance] == NONE) return 0.0f;
     u32 emitter = lights.triangle_emitters[static_cast<u64>(lights.instance_emitters[instance]) + prim];
     if (emitter == NONE) return 0.0f;
     WorldTriangle triangle = make_world_triangle(scene, instance, prim, p);
     if (!triangle.sends) return 0.0f;
+    // From p itself: a ray that went straight through surfaces began its last piece elsewhere.
+    float along = abs_f(dot(triangle.cone.unit_normal, direction));
+    if (along > 0.0f) distance = abs_f(triangle.cone.height) / along;
     LightQuery q = make_light_query(p, n, transmits);
     GroupShares shares;
     group_shares(lights, q, &shares);
@@ -234,7 +236,9 @@ LUCH_FN_SLOW float pdf_lamp(const SceneView& scene, Vec3 p, Vec3 n, bool transmi
     LightQuery q = make_light_query(p, n, transmits);
     GroupShares shares;
     group_shares(lights, q, &shares);
-    float pdf = lamp_pdf(lamp, p, n, transmits, direction, hit.t);
+    // From p itself: a ray that went straight through surfaces began its last piece elsewhere.
+    float distance = lamp.kind == LampKind::SUN ? INFINITE_DISTANCE : intersect_lamp(lamp, p, direction);
+    float pdf = lamp_pdf(lamp, p, n, transmits, direction, distance > 0.0f ? distance : hit.t);
     if (lamp.kind == LampKind::SUN) return pdf * shares.suns * sun_probability(lights, q, lamp.emitter);
     if (lamp.emitter == NONE || !(shares.local > 0.0f)) return 0.0f;
     return pdf * shares.local * local_probability(lights, q, lamp.emitter);
