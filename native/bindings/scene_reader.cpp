@@ -352,13 +352,14 @@ struct Reader {
         auto count = [&](const char* name) { return py::cast<u32>(settings.attr(name)); };
         auto number = [&](const char* name) { return py::cast<float>(settings.attr(name)); };
         PathLimits& limits = input.limits;
-        limits.bounces = count("max_bounces");
-        limits.diffuse = count("diffuse_bounces");
-        limits.glossy = count("glossy_bounces");
-        limits.transmission = count("transmission_bounces");
+        // As in Cycles 0 bounces still mean direct light, so limits count one more; of transparency 0 means none.
+        limits.bounces = count("max_bounces") + 1;
+        limits.diffuse = count("diffuse_bounces") + 1;
+        limits.glossy = count("glossy_bounces") + 1;
+        limits.transmission = count("transmission_bounces") + 1;
         limits.transparent = count("transparent_bounces");
-        limits.min_bounces = count("min_light_bounces");
-        limits.min_transparent = count("min_transparent_bounces");
+        limits.min_bounces = count("min_light_bounces") + 1;
+        limits.min_transparent = count("min_transparent_bounces") + 1;
         limits.clamp_direct = number("clamp_direct");
         limits.clamp_indirect = number("clamp_indirect");
         limits.filter_glossy = number("filter_glossy");
