@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from . import operators, panels, stock
+from . import datablocks, operators, panels, stock
 
 
 def register() -> None:
     operators.register()
-    panels.register()
     stock.register()
+    panels.register()
+    datablocks.register()
 
 
 def unregister() -> None:
-    stock.unregister()
+    datablocks.unregister()
     panels.unregister()
+    stock.unregister()
     operators.unregister()

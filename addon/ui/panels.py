@@ -123,22 +123,36 @@ class LUCH_RENDER_PT_performance(LuchPanel, bpy.types.Panel):
         self.layout.prop(scene.render, "use_persistent_data")
 
 
-class LUCH_VIEWLAYER_PT_passes(LuchPanel, bpy.types.Panel):
-    """Passes of a view layer, under Blender's names."""
+class LUCH_VIEWLAYER_PT_passes_data(LuchPanel, bpy.types.Panel):
+    """Passes that say what is where."""
 
-    bl_label = "Passes"
+    bl_label = "Data"
     bl_context = "view_layer"
+    bl_parent_id = "VIEWLAYER_PT_layer_passes"
 
-    def draw(self, context: Any) -> None:
-        layout: Any = self.layout
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, layer = self.layout, context.view_layer
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layer = context.view_layer
-        column = layout.column(heading="Data")
+        column = layout.column(heading="Include")
         for name in ("combined", "z", "mist", "position", "normal", "uv", "object_index", "material_index"):
             column.prop(layer, f"use_pass_{name}")
         column.prop(layer.luch, "use_pass_denoising")
         column.prop(layer.luch, "use_pass_sample_count")
+        layout.prop(layer, "pass_alpha_threshold")
+
+
+class LUCH_VIEWLAYER_PT_passes_light(LuchPanel, bpy.types.Panel):
+    """Passes that split the light by what it met."""
+
+    bl_label = "Light"
+    bl_context = "view_layer"
+    bl_parent_id = "VIEWLAYER_PT_layer_passes"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, layer = self.layout, context.view_layer
+        layout.use_property_split = True
+        layout.use_property_decorate = False
         for kind in ("diffuse", "glossy", "transmission"):
             row = layout.row(heading=kind.title(), align=True)
             for part in ("direct", "indirect", "color"):
@@ -146,15 +160,6 @@ class LUCH_VIEWLAYER_PT_passes(LuchPanel, bpy.types.Panel):
         column = layout.column(heading="Other")
         for name in ("emit", "environment", "ambient_occlusion"):
             column.prop(layer, f"use_pass_{name}")
-        layout.prop(layer, "pass_alpha_threshold")
-        self._draw_cryptomatte(layout, layer)
-
-    @staticmethod
-    def _draw_cryptomatte(layout: Any, layer: Any) -> None:
-        column = layout.column(heading="Cryptomatte")
-        for name in ("object", "material", "asset"):
-            column.prop(layer, f"use_pass_cryptomatte_{name}", text=name.title())
-        column.prop(layer, "pass_cryptomatte_depth", text="Levels")
 
 
 CLASSES = (
@@ -164,7 +169,8 @@ CLASSES = (
     LUCH_RENDER_PT_bias,
     LUCH_RENDER_PT_film,
     LUCH_RENDER_PT_performance,
-    LUCH_VIEWLAYER_PT_passes,
+    LUCH_VIEWLAYER_PT_passes_data,
+    LUCH_VIEWLAYER_PT_passes_light,
 )
 
 

@@ -1,4 +1,4 @@
-"""Blender's own panels that make sense with Luch (and Cycles' for lamps, worlds and passes, which Luch obeys)."""
+"""Blender's own panels that make sense with Luch."""
 
 from __future__ import annotations
 
@@ -7,19 +7,37 @@ from typing import Any
 import bpy
 
 ENGINE = "LUCH"
-# Panels whose content means nothing to Luch, or that our own replace.
+# Panels for every engine whose content means nothing to Luch, or that our own replace.
 EXCLUDED = frozenset(
-    {"DATA_PT_light", "DATA_PT_spot", "NODE_DATA_PT_light", "NODE_DATA_PT_spot", "RENDER_PT_simplify"}
-    | {"VIEWLAYER_PT_layer_passes", "VIEWLAYER_PT_filter", "DATA_PT_falloff_curve", "RENDER_PT_freestyle"}
+    {"DATA_PT_light", "DATA_PT_spot", "DATA_PT_falloff_curve", "RENDER_PT_simplify", "RENDER_PT_freestyle"}
+)
+# Panels that name their engines one by one, and whose content Luch obeys.
+INCLUDED = frozenset(
+    {
+        "DATA_PT_camera_dof",
+        "DATA_PT_camera_dof_aperture",
+        "EEVEE_MATERIAL_PT_context_material",
+        "EEVEE_MATERIAL_PT_surface",
+        "EEVEE_MATERIAL_PT_displacement",
+        "EEVEE_WORLD_PT_surface",
+        "EEVEE_WORLD_PT_mist",
+        "MATERIAL_PT_preview",
+        "VIEWLAYER_PT_layer_passes",
+        "VIEWLAYER_PT_layer_passes_aov",
+        "VIEWLAYER_PT_layer_passes_cryptomatte",
+        "VIEWLAYER_PT_layer_passes_lightgroups",
+        "VIEWLAYER_PT_override",
+    }
 )
 
 
 def stock_panels() -> list[Any]:
-    """Panels of Blender that any engine may use."""
+    """Blender's panels that Luch wants to see."""
     return [
         panel
         for panel in bpy.types.Panel.__subclasses__()
-        if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ()) and panel.__name__ not in EXCLUDED
+        if panel.__name__ in INCLUDED
+        or ("BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ()) and panel.__name__ not in EXCLUDED)
     ]
 
 
@@ -29,7 +47,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    panels: list[Any] = bpy.types.Panel.__subclasses__()
-    for panel in panels:
-        if ENGINE in getattr(panel, "COMPAT_ENGINES", ()):
-            panel.COMPAT_ENGINES.discard(ENGINE)
+    for panel in stock_panels():
+        panel.COMPAT_ENGINES.discard(ENGINE)

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import pytest
 
-from addon.ui import panels
+from addon.ui import datablocks, panels, stock
 
 
 class Layout:
@@ -33,12 +33,16 @@ class Layout:
 
     column = row
 
+    def template_node_view(self, tree: Any, node: Any, socket: Any) -> None:
+        assert socket is not None
+        self.drawn.append(node.name)
 
-def draw(panel: Any, scene: bpy.types.Scene) -> list[str]:
+
+def draw(panel: Any, scene: bpy.types.Scene, **context: object) -> list[str]:
     layout = Layout()
-    context = SimpleNamespace(scene=scene, view_layer=scene.view_layers[0], engine="LUCH")
-    assert panel.poll(context)
-    panel.draw(SimpleNamespace(layout=layout, _draw_cryptomatte=getattr(panel, "_draw_cryptomatte", None)), context)
+    space = SimpleNamespace(scene=scene, view_layer=scene.view_layers[0], engine="LUCH", **context)
+    assert panel.poll(space)
+    panel.draw(SimpleNamespace(layout=layout, draw_shape=getattr(panel, "draw_shape", None)), space)
     return layout.drawn
 
 
@@ -46,6 +50,28 @@ def draw(panel: Any, scene: bpy.types.Scene) -> list[str]:
 def test_a_panel_draws_existing_properties(scene: bpy.types.Scene, panel: Any) -> None:
     scene.render.film_transparent = True
     assert draw(panel, scene)
+
+
+@pytest.mark.parametrize("kind", ["POINT", "SPOT", "SUN", "AREA"])
+def test_lamps_show_their_power_and_shape(scene: bpy.types.Scene, kind: str) -> None:
+    lamp = bpy.data.lights.new("Lamp", kind)
+    drawn = draw(datablocks.LUCH_LIGHT_PT_light, scene, light=lamp)
+    shape = {"POINT": "shadow_soft_size", "SPOT": "spot_size", "SUN": "angle", "AREA": "spread"}[kind]
+    assert {"energy", "exposure", "use_shadow", shape} <= set(drawn)
+
+
+def test_nodes_worlds_objects_and_materials_show_what_is_read_of_them(scene: bpy.types.Scene) -> None:
+    world, material = bpy.data.worlds.new("Sky"), bpy.data.materials.new("Stone")
+    thing = bpy.data.objects.new("Thing", bpy.data.meshes.new("Thing"))
+    assert "Light Output" in draw(datablocks.LUCH_LIGHT_PT_nodes, scene, light=bpy.data.lights.new("Lamp", "POINT"))
+    assert "sampling_method" in draw(datablocks.LUCH_WORLD_PT_settings, scene, world=world)
+    assert "visible_shadow" in draw(datablocks.LUCH_OBJECT_PT_ray_visibility, scene, object=thing)
+    assert "pass_index" in draw(datablocks.LUCH_MATERIAL_PT_settings, scene, material=material)
+
+
+@pytest.mark.parametrize("name", sorted(stock.INCLUDED))
+def test_a_panel_that_is_asked_for_by_name_exists(name: str) -> None:
+    assert "LUCH" in getattr(bpy.types, name).COMPAT_ENGINES
 
 
 def test_every_shared_setting_has_its_place_in_a_panel(scene: bpy.types.Scene) -> None:
