@@ -11,5 +11,6 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_render(m);
     luch::bindings::bind_sampling(m);
     luch::bindings::bind_shade(m);
+    luch::bindings::bind_sky(m);
     luch::bindings::bind_textures(m);
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bindings/bind.h"
+#include "bindings/images.h"
 #include "cpu/geometry/islands.h"
 #include "cpu/shade/link.h"
 #include "luch/camera/camera.h"
@@ -43,6 +44,7 @@ struct TestScene {
     MaterialView material{};
     u32 material_table = 0;
     std::vector<u16> material_slots;
+    std::vector<ImageView> images;
     SceneView view{};
 };
 
@@ -139,6 +141,11 @@ void load_scene(TestScene& scene, const py::dict& description) {
     view.normals = scene.normals.data();
     view.triangles = scene.triangles.data();
     view.material_slots = scene.material_slots.data();
+    if (description.contains("images")) {
+        for (const auto& image : description["images"]) scene.images.push_back(view_image(py::cast<py::tuple>(image)));
+    }
+    view.images = scene.images.data();
+    view.image_count = u32(scene.images.size());
     view.attribute_data = scene.attribute_data.data();
     view.attributes = scene.attributes.data();
     view.meshes = &scene.mesh;

@@ -9,8 +9,9 @@
 #include <pybind11/stl.h>
 
 #include "bindings/bind.h"
+#include "bindings/images.h"
 #include "cpu/shade/interpreter.h"
-#include "luch/shade/ops.h"
+#include "luch/shade/textures/ops.h"  // not all of shade/ops.h: this file is long to compile
 
 namespace luch::bindings {
 namespace {
@@ -38,13 +39,12 @@ void run_one_by_one(const Call& call) {
 
 struct TextureOp {
     const char* name;
-    int code, inputs, outputs, params;
+    int inputs, outputs, params;
     void (*run_one_by_one)(const Call&);
 };
 
 const TextureOp OPS[] = {
-#define LUCH_OP(NAME, STRUCT) \
-    {#NAME, int(OpCode::NAME), STRUCT::inputs, STRUCT::outputs, STRUCT::params, run_one_by_one<STRUCT>},
+#define LUCH_OP(NAME, STRUCT) {#NAME, STRUCT::inputs, STRUCT::outputs, STRUCT::params, run_one_by_one<STRUCT>},
 #include "luch/shade/textures/ops.inc"
 #undef LUCH_OP
 };
@@ -62,12 +62,18 @@ class OneInstruction {
     OneInstruction(const TextureOp& op, const std::vector<u32>& params) : op_(op) {
         for (int k = 0; k < op.outputs + op.inputs; k++) operands_.push_back(u32(k));
         operands_.insert(operands_.end(), params.begin(), params.end());
-        instruction_ = {u16(op.code), u16(params.size()), 0};
+        instruction_ = {u16(code_of(op)), u16(params.size()), 0};
         program.instruction_count = 1;
         program.register_count = u32(op.outputs + op.inputs);
         scene.instructions = &instruction_;
         scene.operands = operands_.data();
         registers_.resize(cpu::register_floats(program) + 16);
+    }
+
+    static int code_of(const TextureOp& op) {
+        int code = 0;
+        while (std::strcmp(cpu::op_info(code).name, op.name) != 0) code++;
+        return code;
     }
 
     void run(const Call& call) {
@@ -99,26 +105,6 @@ class OneInstruction {
     std::vector<float> registers_;
 };
 
-// pixels: (H, W, C) contiguous uint8, float16 or float32; the caller keeps them alive.
-ImageView view_image(const py::array& pixels, bool srgb, int alpha) {
-    const char kind = pixels.dtype().kind();
-    const py::ssize_t size = pixels.itemsize();
-    if (pixels.ndim() != 3 || !(pixels.flags() & py::array::c_style) || pixels.shape(2) > 4) {
-        throw std::invalid_argument("An image must be a contiguous (H, W, 1..4) array.");
-    }
-    const bool byte = kind == 'u' && size == 1, half = kind == 'f' && size == 2, single = kind == 'f' && size == 4;
-    if (!byte && !half && !single) throw std::invalid_argument("An image must be uint8, float16 or float32.");
-    ImageView view{};
-    view.pixels = pixels.data();
-    view.height = u32(pixels.shape(0));
-    view.width = u32(pixels.shape(1));
-    view.channels = u8(pixels.shape(2));
-    view.format = byte ? PixelFormat::U8 : (half ? PixelFormat::F16 : PixelFormat::F32);
-    view.srgb = srgb;
-    view.alpha = u8(alpha);
-    return view;
-}
-
 py::array_t<float> run_texture(const std::string& name, const FloatRows& inputs, const std::vector<u32>& params,
                                const FloatRows& table, const std::vector<py::tuple>& images, bool one_by_one) {
     const TextureOp& op = find_op(name);
@@ -135,7 +121,7 @@ py::array_t<float> run_texture(const std::string& name, const FloatRows& inputs,
     std::vector<u32> slots;
     for (const py::tuple& image : images) {
         slots.push_back(u32(views.size()));
-        views.push_back(view_image(py::cast<py::array>(image[0]), py::cast<bool>(image[1]), py::cast<int>(image[2])));
+        views.push_back(view_image(image));
     }
     run.scene.images = views.data();
     run.scene.program_images = slots.data();

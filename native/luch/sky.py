@@ -1,8 +1,8 @@
 """Tables of the Sky Texture (shade/textures/sky.h): what is computed once per sky instead of once per ray.
 
-Two atmospheres: *single scattering* (Nishita et al. 1993: one bounce of sunlight on air and dust, 21
-wavelengths) and *multiple scattering* (Garcia Linan 2023: four wavelengths, later bounces by a fit).
-All quantities are Blender's, so that a sky looks as it does in Cycles. Radiances are CIE XYZ.
+Two atmospheres (native/cpu/sky/): *single scattering* (Nishita et al. 1993: one bounce of sunlight on air
+and dust, 21 wavelengths) and *multiple scattering* (Garcia Linan 2023: four wavelengths, later bounces by
+a fit). All quantities are Blender's, so that a sky looks as it does in Cycles. Radiances are CIE XYZ.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from luch import atmosphere_multiple, atmosphere_single
+from luch._native import core
 
 F32 = NDArray[np.float32]
 
-COLUMNS, ROWS = 512, 256  # as SkyAtmosphere
+EARTH_RADIUS_M = 6371e3
 SMALLEST_SUN = 0.0005  # radians
 
 
@@ -58,17 +58,26 @@ def sun_direction(elevation: float, rotation: float) -> tuple[float, float, floa
 @lru_cache(maxsize=4)
 def atmosphere_table(a: Atmosphere) -> F32:
     """SkyAtmosphere as float32: 11 numbers of the sun, then (256, 256, 3) of the sky's left half."""
-    model = atmosphere_multiple if a.multiple_scattering else atmosphere_single
     elevation, rotation = wrap_sun(a.sun_elevation, a.sun_rotation)
-    densities = (a.air_density, a.aerosol_density, a.ozone_density)
     diameter = max(a.sun_size, SMALLEST_SUN)
-    bottom, top = (model.sun_radiance(elevation, diameter, a.altitude, densities, end) for end in (-0.5, 0.5))
-    sky = model.sky_radiance(COLUMNS // 2, ROWS, elevation, a.altitude, densities)
-    earth_km = atmosphere_multiple.EARTH_RADIUS_KM
-    horizon = np.arcsin(earth_km / (earth_km + a.altitude / 1000.0)) - np.pi / 2.0
+    bottom, top = (_disc_radiance(a, elevation + end * diameter, diameter) for end in (-0.5, 0.5))
+    densities = (a.air_density, a.aerosol_density, a.ozone_density)
+    radiance = core.sky.radiance(a.multiple_scattering, elevation, a.altitude, *densities)
+    horizon = np.arcsin(EARTH_RADIUS_M / (EARTH_RADIUS_M + a.altitude)) - np.pi / 2.0
     disc = diameter if a.sun_disc else -1.0
     sun = [*bottom, *top, elevation, rotation, disc, a.sun_intensity, horizon]
-    return np.concatenate([np.array(sun, np.float32), sky.astype(np.float32).ravel()])
+    return np.concatenate([np.array(sun, np.float32), radiance.ravel()])
+
+
+def _disc_radiance(a: Atmosphere, elevation: float, diameter: float) -> NDArray[np.float64]:
+    """XYZ radiance of the sun's disc where it stands at an elevation."""
+    if not a.multiple_scattering:
+        if wrap_sun(a.sun_elevation, 0.0)[0] + 0.5 * diameter <= 0.0:
+            return np.zeros(3)
+        elevation = max(elevation, 0.0)
+    densities = (a.air_density, a.aerosol_density, a.ozone_density)
+    irradiance = core.sky.sun_irradiance(a.multiple_scattering, elevation, a.altitude, *densities)
+    return np.array(irradiance) / (2.0 * np.pi * (1.0 - np.cos(diameter / 2.0)))
 
 
 def preetham_table(direction: tuple[float, float, float], turbidity: float) -> F32:
