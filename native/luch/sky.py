@@ -77,7 +77,7 @@ def _disc_radiance(a: Atmosphere, elevation: float, diameter: float) -> NDArray[
         elevation = max(elevation, 0.0)
     densities = (a.air_density, a.aerosol_density, a.ozone_density)
     irradiance = core.sky.sun_irradiance(a.multiple_scattering, elevation, a.altitude, *densities)
-    return np.array(irradiance) / (2.0 * np.pi * (1.0 - np.cos(diameter / 2.0)))
+    return np.asarray(np.array(irradiance) / (2.0 * np.pi * (1.0 - np.cos(diameter / 2.0))))
 
 
 def preetham_table(direction: tuple[float, float, float], turbidity: float) -> F32:
