@@ -425,3 +425,6 @@ def test_nodes_give_what_cycles_gives(family: Callable[[], dict[str, Case]], tmp
     for text in tiles.warnings:
         print("warning:", text)
     assert not failures, failures
+    # The renderer runs the same programs; its points lie a little apart, so that jumps and slopes show.
+    apart = np.abs(tiles.drawn - tiles.cycles)[tiles.hit] / scale[tiles.hit]
+    assert (apart.max(-1) < 0.02).mean() > 0.985

@@ -38,6 +38,7 @@ class Tiles:
     names: list[str]
     cycles: F32
     luch: F32
+    drawn: F32  # by Luch's renderer, within a hundredth of a pixel of Cycles' points
     hit: NDArray[np.bool_]  # (cases, TILE, TILE): the pixel shows the patch
     warnings: list[str]
 
@@ -123,20 +124,22 @@ def compare(cases: dict[str, Case], folder: Path) -> Tiles:
     size = side * TILE
     passes = render_passes("CYCLES", folder, width=size, height=size, samples=1)
     picture, position = passes["Combined"][::-1], passes["Position"][::-1].astype(np.float64)
+    scene.luch.pixel_filter_type, scene.luch.filter_width = "GAUSSIAN", 0.01
+    ours = render_passes("LUCH", folder, width=size, height=size, samples=1)["Combined"][::-1]
     context = ExportContext(bpy.context.evaluated_depsgraph_get(), Scene())
     cycles = np.zeros((len(objects), TILE, TILE, 3), np.float32)
-    luch, hit = np.zeros_like(cycles), np.zeros(cycles.shape[:3], np.bool_)
+    luch, drawn, hit = np.zeros_like(cycles), np.zeros_like(cycles), np.zeros(cycles.shape[:3], np.bool_)
     for index, tile in enumerate(objects):
         column, row = index % side, index // side
         cut = np.s_[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE]
-        cycles[index] = picture[cut][..., :3]
+        cycles[index], drawn[index] = picture[cut][..., :3], ours[cut][..., :3]
         program = compile_material(tile.material_slots[0].material, context).surface
         mesh = export_mesh(tile.data, wishes(program), tile.data, context)
         assert mesh is not None
         points, hit[index] = tile_points(mesh, tile, position[cut])
         values = evaluate(program, mesh, tile, points, scene, size)
         luch[index][hit[index]] = values
-    return Tiles(list(cases), cycles, luch, hit, context.result.warnings)
+    return Tiles(list(cases), cycles, luch, drawn, hit, context.result.warnings)
 
 
 def tile_points(mesh: Mesh, tile: Any, seen: F64) -> tuple[dict[str, Any], NDArray[np.bool_]]:

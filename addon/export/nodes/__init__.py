@@ -57,10 +57,21 @@ def compile_material(material: bpy.types.Material | None, context: Context) -> s
 
 
 def default_material(name: str = "Default") -> scene.Material:
-    """What Blender shows where a slot is empty: grey diffuse of 0.8."""
+    """What Blender shows where a slot is empty: Principled as it comes, grey of 0.8."""
     builder = ProgramBuilder()
-    inputs = [*builder.vector(0.8, 0.8, 0.8), builder.constant(0.0), *builder.vector(0.0, 0.0, 0.0)]
-    builder.closure("CLOSURE_DIFFUSE", builder.vector(1.0, 1.0, 1.0), inputs, (1,))
+    zero, one = builder.constant(0.0), builder.constant(1.0)
+    black, white = (zero, zero, zero), (one, one, one)
+    values = builder.constant
+    inputs = [
+        *builder.vector(0.8, 0.8, 0.8),
+        *(zero, values(0.5), values(1.5), zero, *black),  # metallic, roughness, IOR, thin wall, normal
+        *(zero, zero, zero, values(0.5), *white),  # diffuse roughness, subsurface (2), specular level and tint
+        *(zero, zero, *black, zero),  # anisotropy and its rotation, tangent, transmission
+        *(zero, values(0.03), values(1.5), *white, *black),  # coat
+        *(zero, values(0.5), *white),  # sheen
+        *(*black, one, zero, values(1.33)),  # emission, thin film
+    ]
+    builder.closure("CLOSURE_PRINCIPLED", white, inputs, (1, 1, 0, 0))
     return scene.Material(name=name, surface=builder.finish())
 
 

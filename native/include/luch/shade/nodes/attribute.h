@@ -111,6 +111,9 @@ struct OpAttributeValue {
     static constexpr bool reads_point = true;
     LUCH_FN_SLOW static void eval(const OpContext& c, const u32* params, const float*, float* out) {
         AttributeValue a = read_attribute(c, attribute_of(c, params[2]), params);
+        if (params[2] == ATTRIBUTE_UV && c.points->instance[c.lane] == NONE && c.points->prim[c.lane] != NONE) {
+            a = {{c.points->u[c.lane], c.points->v[c.lane], 0.0f, 0.0f}, 2};  // a lamp's own parameters
+        }
         const float* v = a.value;
         out[0] = v[0];
         out[1] = a.channels == 1 ? v[0] : v[1];

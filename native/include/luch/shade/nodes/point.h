@@ -2,6 +2,7 @@
 // Operations on a place take the corner of the bump stencil in params[0..1] (see attribute.h).
 #pragma once
 #include "luch/camera/camera.h"
+#include "luch/light/light.h"
 #include "luch/shade/nodes/attribute.h"
 
 namespace luch {
@@ -21,6 +22,28 @@ LUCH_FN const InstanceView* instance_at(const OpContext& c) {
     return index == NONE ? nullptr : c.scene->instances + index;
 }
 
+LUCH_FN const LampView* lamp_at(const OpContext& c) {
+    const u32 index = c.points->prim[c.lane];
+    return c.points->instance[c.lane] == NONE && index != NONE ? c.scene->lights->lamps + index : nullptr;
+}
+LUCH_FN bool is_distant(const OpContext& c) {  // a sun or the world
+    if (c.points->instance[c.lane] != NONE) return false;
+    const LampView* lamp = lamp_at(c);
+    return !lamp || lamp->kind == LampKind::SUN;
+}
+// Blender's world position: the scene's origin is added back. A world's direction stays one, a sun's
+// place is the direction in which it shines.
+LUCH_FN Vec3 blender_position(const OpContext& c, Vec3 p) {
+    if (!is_distant(c)) return p + c.scene->origin;
+    return lamp_at(c) ? -p : p;
+}
+LUCH_FN Vec3 to_lamp(const LampView& lamp, Vec3 v) {
+    const float* m = lamp.to_local;
+    return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
+            m[6] * v.x + m[7] * v.y + m[8] * v.z};
+}
+LUCH_FN Vec3 lamp_parameters(const OpContext& c) { return {c.points->u[c.lane], c.points->v[c.lane], 0.0f}; }
+
 // An input operation of no inputs: BODY sets out from c and params.
 #define LUCH_POINT_OP(STRUCT, OUTPUTS, PARAMS, BODY)                                                \
     struct STRUCT {                                                                                 \
@@ -32,17 +55,16 @@ LUCH_FN const InstanceView* instance_at(const OpContext& c) {
         }                                                                                           \
     }
 
-// Blender's world position: the scene's origin is added back. A world's direction stays one.
-LUCH_POINT_OP(OpPointPosition, 3, 2, {
-    Vec3 origin = c.points->instance[c.lane] == NONE ? make_vec3(0.0f) : c.scene->origin;
-    store_vec3(out, position_at(c) + stencil_offset(c, params) + origin);
-});
+LUCH_POINT_OP(OpPointPosition, 3, 2,
+              { store_vec3(out, blender_position(c, position_at(c) + stencil_offset(c, params))); });
 LUCH_POINT_OP(OpPointNormal, 3, 0, { store_vec3(out, normal_at(c)); });
 LUCH_POINT_OP(OpPointTrueNormal, 3, 0, { store_vec3(out, geometric_normal_at(c)); });
 LUCH_POINT_OP(OpPointIncoming, 3, 0, { store_vec3(out, incoming_at(c)); });
 LUCH_POINT_OP(OpPointBackfacing, 1, 0, { out[0] = (c.points->flags[c.lane] & PATH_BACKFACING) ? 1.0f : 0.0f; });
 // Barycentrics as Blender counts them: weight of the first corner, of the second.
 LUCH_POINT_OP(OpPointParametric, 3, 2, {
+    if (c.points->instance[c.lane] == NONE)
+        return store_vec3(out, lamp_at(c) ? lamp_parameters(c) : make_vec3(1.0f, 0.0f, 0.0f));
     Vec2 uv = barycentrics_at(c, params);
     store_vec3(out, {1.0f - uv.x - uv.y, uv.x, 0.0f});
 });
@@ -52,14 +74,16 @@ LUCH_POINT_OP(OpPointParametric, 3, 2, {
 LUCH_FN Vec3 object_position(const OpContext& c, const u32* params) {
     const InstanceView* instance = instance_at(c);
     Vec3 p = position_at(c) + stencil_offset(c, params);
-    return instance ? transform_point(instance->to_object, p) : p;
+    if (instance) return transform_point(instance->to_object, p);
+    const LampView* lamp = lamp_at(c);
+    return lamp ? to_lamp(*lamp, blender_position(c, p) - (lamp->position + c.scene->origin)) : p;
 }
 LUCH_POINT_OP(OpPointObject, 3, 2, { store_vec3(out, object_position(c, params)); });
 LUCH_POINT_OP(OpPointOtherObject, 3, 14, {
     Affine to_object;
     for (int k = 0; k < 12; k++) to_object.m[k] = bits_float(params[2 + k]);
-    Vec3 origin = c.points->instance[c.lane] == NONE ? make_vec3(0.0f) : c.scene->origin;
-    store_vec3(out, transform_point(to_object, position_at(c) + stencil_offset(c, params) + origin));
+    Vec3 p = blender_position(c, position_at(c) + stencil_offset(c, params));
+    store_vec3(out, transform_point(to_object, p));
 });
 LUCH_FN Vec3 normal_to_object(const InstanceView* instance, Vec3 n) {
     return instance ? safe_normalize(transform_direction_transposed(instance->to_world, n)) : n;
@@ -67,12 +91,16 @@ LUCH_FN Vec3 normal_to_object(const InstanceView* instance, Vec3 n) {
 LUCH_FN Vec3 normal_to_world(const InstanceView* instance, Vec3 n) {
     return instance ? safe_normalize(transform_direction_transposed(instance->to_object, n)) : n;
 }
-LUCH_POINT_OP(OpPointObjectNormal, 3, 0, { store_vec3(out, normal_to_object(instance_at(c), normal_at(c))); });
+LUCH_POINT_OP(OpPointObjectNormal, 3, 0, {
+    const LampView* lamp = lamp_at(c);
+    store_vec3(out,
+               lamp ? safe_normalize(to_lamp(*lamp, normal_at(c))) : normal_to_object(instance_at(c), normal_at(c)));
+});
 
 // 0..1 over Blender's texture space; an attribute of undeformed coordinates wins.
 LUCH_FN Vec3 generated_at(const OpContext& c, const u32* params) {
     const InstanceView* instance = instance_at(c);
-    if (!instance) return position_at(c) + stencil_offset(c, params);
+    if (!instance) return object_position(c, params);
     AttributeValue a = read_attribute(c, c.scene->generated_attribute, params);
     if (a.channels >= 3) return load_vec3(a.value);
     const MeshView& mesh = c.scene->meshes[instance->mesh];
@@ -114,7 +142,9 @@ LUCH_POINT_OP(OpPointReflection, 3, 0, {
 // out: unit direction from the camera, camera space; depth along the axis; distance.
 LUCH_POINT_OP(OpCameraData, 5, 0, {
     Vec3 p = make_vec3(0.0f);
-    if (c.scene->camera) p = transform_point(c.scene->camera->to_camera, position_at(c));
+    // A world's direction is taken for a place, as in Cycles.
+    Vec3 place = instance_at(c) ? position_at(c) : position_at(c) - c.scene->origin;
+    if (c.scene->camera) p = transform_point(c.scene->camera->to_camera, place);
     store_vec3(out, safe_normalize(p));
     out[3] = p.z;
     out[4] = length(p);
@@ -122,8 +152,10 @@ LUCH_POINT_OP(OpCameraData, 5, 0, {
 
 LUCH_POINT_OP(OpObjectLocation, 3, 0, {
     const InstanceView* i = instance_at(c);
-    store_vec3(
-        out, i ? make_vec3(i->to_world.m[3], i->to_world.m[7], i->to_world.m[11]) + c.scene->origin : make_vec3(0.0f));
+    const LampView* lamp = lamp_at(c);
+    Vec3 place = lamp ? lamp->position + c.scene->origin : make_vec3(0.0f);
+    if (i) place = make_vec3(i->to_world.m[3], i->to_world.m[7], i->to_world.m[11]) + c.scene->origin;
+    store_vec3(out, place);
 });
 LUCH_POINT_OP(OpObjectColor, 4, 0, {
     const InstanceView* i = instance_at(c);
@@ -135,15 +167,18 @@ LUCH_POINT_OP(OpObjectIndex, 1, 0, {
 });
 LUCH_POINT_OP(OpObjectRandom, 1, 0, {
     const InstanceView* i = instance_at(c);
-    out[0] = i ? i->random : 0.0f;
+    const LampView* lamp = lamp_at(c);
+    out[0] = i ? i->random : (lamp ? lamp->random : 0.0f);
 });
 
 // params[0]: bits of PathFlag, any of which gives 1.
 LUCH_POINT_OP(OpLightPathFlag, 1, 1, { out[0] = (c.points->flags[c.lane] & params[0]) ? 1.0f : 0.0f; });
 LUCH_POINT_OP(OpLightPathLength, 1, 0, { out[0] = c.points->ray_length[c.lane]; });
-// Light that arrives (by a shadow ray or at a lamp's sampled point) counts as one bounce further.
+// Light that arrives (from the world, a lamp, a sampled point, or by a shadow ray) counts as one bounce
+// further.
 LUCH_POINT_OP(OpLightPathDepth, 1, 0, {
-    const bool arrives = (c.points->flags[c.lane] & (PATH_SHADOW | PATH_EMISSION_ONLY)) != 0;
+    const bool arrives =
+        (c.points->flags[c.lane] & (PATH_SHADOW | PATH_EMISSION_ONLY)) != 0 || c.points->instance[c.lane] == NONE;
     out[0] = float(c.points->depth[c.lane] & 255u) + (arrives ? 1.0f : 0.0f);
 });
 // params[0]: 8 diffuse, 16 glossy, 24 transmission.
@@ -156,7 +191,7 @@ struct OpLightFalloff {
     static constexpr bool reads_point = true;
     LUCH_FN static void eval(const OpContext& c, const u32*, const float* in, float* out) {
         float length = c.points->ray_length[c.lane];
-        bool distant = !(length < 1e30f);  // suns and the world: the node does nothing
+        bool distant = is_distant(c) || !(length < 1e30f);  // there the node does nothing
         float squared = length * length;
         float smooth = in[1] > 0.0f ? squared / (in[1] + squared) : 1.0f;
         out[0] = distant ? in[0] : in[0] * smooth;
