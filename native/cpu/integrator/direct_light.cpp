@@ -35,10 +35,9 @@ void Batch::sample_lights(const u32* queue, int lit_count) {
         const ClosureSet& set = scratch_->sets[lane];
         if (set.count == 0 || !has_smooth_lobe(set)) continue;
         const PathState& path = paths_[ray_path_[queue[lane]]];
-        float u_choice = sample_1d(path.sampler, path.dimension + DIM_LIGHT_CHOICE);
-        Vec2 u = sample_2d(path.sampler, path.dimension + DIM_LIGHT);
+        Vec3 u = sample_3d(path.sampler, path.dimension + DIM_LIGHT);
         samples[lane] = sample_light(scene_.view, lane_position(points, lane), lane_normal(points, lane),
-                                     set_transmits(set), u_choice, u);
+                                     set_transmits(set), u.z, {u.x, u.y});
         const LightSample& s = samples[lane];
         if (s.kind == EmitterKind::NONE_ || !(s.pdf_sa > 0.0f)) continue;
         wanted[wanted_count++] = lane;

@@ -133,16 +133,16 @@ void Batch::scatter(PathState& path, u32 k, int lane) {
     float through = average(set.transparent), lobes = 0.0f;
     for (int i = 0; i < set.count; i++) lobes += set.lobes[i].sample_weight;
     if (!(through + lobes > 0.0f)) return;
-    float u_lobe = sample_1d(path.sampler, path.dimension + DIM_LOBE);
+    Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
+    float u_lobe = u.z;
     float through_probability = through / (through + lobes);
     if (u_lobe < through_probability) {
         pass_through(path, k, lane, set.transparent * (1.0f / through_probability));
         return;
     }
     u_lobe = min_f((u_lobe - through_probability) / (1.0f - through_probability), 0.99999994f);
-    Vec2 u = sample_2d(path.sampler, path.dimension + DIM_BSDF);
     Vec3 ng = lane_face_normal(points, lane);
-    BsdfSample s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, u);
+    BsdfSample s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
     if (!(s.pdf_sa > 0.0f) || is_zero(s.throughput)) return;
     if (!finite_v(s.throughput)) {
         counts_.bad_samples++;

@@ -57,8 +57,8 @@ struct PathLimits {
 
 // Sobol dimensions: the camera takes the first, every event of a path a block of its own.
 inline constexpr u32 DIMENSIONS_CAMERA = 4;
-inline constexpr u32 DIMENSIONS_PER_EVENT = 8;
-enum EventDimension : u32 { DIM_LIGHT_CHOICE, DIM_LIGHT, DIM_LOBE, DIM_BSDF, DIM_TERMINATE, DIM_AO };
+inline constexpr u32 DIMENSIONS_PER_EVENT = 4;
+enum EventDimension : u32 { DIM_LIGHT, DIM_BSDF, DIM_TERMINATE, DIM_AO };
 
 // Power heuristic (Veach 1995, exponent 2), without overflow for huge densities.
 LUCH_FN float mis_weight(float pdf, float other_pdf) {

@@ -68,10 +68,44 @@ LUCH_FN Vec2 sample_2d(const Sampler& s, u32 dimension) {
     return {unit_float(reverse_bits(x)), unit_float(reverse_bits(y))};
 }
 
-// x, y form a 2D net; z is a 1D net of its own. Uses no other dimension number.
+// Third Sobol coordinate, by bytes of the index: what each byte's bits add, lowest bit first. Direction
+// numbers of the polynomial x^2 + x + 1 with m = 1, 3 (Joe and Kuo 2008, dimension 3).
+struct ThirdSobolTable {
+    u32 by_byte[4][256];
+
+    constexpr ThirdSobolTable() : by_byte{} {
+        u32 m[32] = {1u, 3u};
+        for (int k = 2; k < 32; ++k) m[k] = (m[k - 1] << 1) ^ (m[k - 2] << 2) ^ m[k - 2];
+        for (int byte = 0; byte < 4; ++byte) {
+            for (u32 value = 0; value < 256u; ++value) {
+                for (int bit = 0; bit < 8; ++bit) {
+                    if (!((value >> bit) & 1u)) continue;
+                    int k = byte * 8 + bit;
+                    // m[k] has k + 1 binary places; as bits of a fraction, first digit lowest.
+                    for (int digit = 0; digit <= k; ++digit) {
+                        if ((m[k] >> (k - digit)) & 1u) by_byte[byte][value] ^= 1u << digit;
+                    }
+                }
+            }
+        }
+    }
+};
+LUCH_CONST ThirdSobolTable THIRD_SOBOL{};
+
+LUCH_FN u32 third_fold(u32 i) {
+    return THIRD_SOBOL.by_byte[0][i & 255u] ^ THIRD_SOBOL.by_byte[1][(i >> 8) & 255u] ^
+           THIRD_SOBOL.by_byte[2][(i >> 16) & 255u] ^ THIRD_SOBOL.by_byte[3][i >> 24];
+}
+
+// A three-dimensional point of one sequence: x, y form a (0, m, 2)-net, and what a choice by z leaves of
+// them is still well spread (a lamp or a lobe chosen by z, a place on it by x and y).
 LUCH_FN Vec3 sample_3d(const Sampler& s, u32 dimension) {
-    Vec2 xy = sample_2d(s, dimension);
-    return {xy.x, xy.y, sample_1d({s.seed ^ 0x68bc21ebu, s.index}, dimension)};
+    u32 hash = hash_u32(s.seed, dimension);
+    u32 i = shuffled_index(s.index, hash);
+    u32 x = scramble_upward(i, derive_seed(hash, 0x85ebca77u));
+    u32 y = scramble_upward(pascal_fold(i), derive_seed(hash, 0xc2b2ae3du));
+    u32 z = scramble_upward(third_fold(i), derive_seed(hash, 0x27d4eb2fu));
+    return {unit_float(reverse_bits(x)), unit_float(reverse_bits(y)), unit_float(reverse_bits(z))};
 }
 
 // Position of (x, y) on a Hilbert curve that fills a square of 2^levels pixels.
