@@ -23,7 +23,7 @@ Vec3 vec3_of(const py::handle& value) {
 
 // Reads inputs by name and remembers which names exist, so that a misspelt one is an error.
 class Inputs {
-   public:
+ public:
     explicit Inputs(const py::dict& values) : values_(values) {}
     ~Inputs() noexcept(false) {
         if (std::uncaught_exceptions()) return;
@@ -31,9 +31,15 @@ class Inputs {
             if (!known_.count(key.cast<std::string>()))
                 throw std::invalid_argument("closure has no input " + key.cast<std::string>());
     }
-    void read(const char* name, float& to) { get(name, [&](py::handle v) { to = v.cast<float>(); }); }
-    void read(const char* name, bool& to) { get(name, [&](py::handle v) { to = v.cast<bool>(); }); }
-    void read(const char* name, Vec3& to) { get(name, [&](py::handle v) { to = vec3_of(v); }); }
+    void read(const char* name, float& to) {
+        get(name, [&](py::handle v) { to = v.cast<float>(); });
+    }
+    void read(const char* name, bool& to) {
+        get(name, [&](py::handle v) { to = v.cast<bool>(); });
+    }
+    void read(const char* name, Vec3& to) {
+        get(name, [&](py::handle v) { to = vec3_of(v); });
+    }
     void read(const char* name, Microfacets& to) {
         static const std::map<std::string, Microfacets> names = {{"GGX", Microfacets::GGX},
                                                                  {"BECKMANN", Microfacets::BECKMANN},
@@ -42,7 +48,7 @@ class Inputs {
         get(name, [&](py::handle v) { to = names.at(v.cast<std::string>()); });
     }
 
-   private:
+ private:
     template <class F>
     void get(const char* name, F use) {
         known_[name] = true;
@@ -138,7 +144,8 @@ const std::map<std::string, Setup>& setups() {
              auto s = read_simple(in);
              setup_translucent(set, w, s.color, s.normal, c);
          }},
-        {"transparent", [](Set set, Color w, Inputs& in, Context) { setup_transparent(set, w, read_simple(in).color); }},
+        {"transparent",
+         [](Set set, Color w, Inputs& in, Context) { setup_transparent(set, w, read_simple(in).color); }},
         {"emission",
          [](Set set, Color w, Inputs& in, Context) {
              auto s = read_simple(in);
@@ -203,7 +210,7 @@ Closures make_closures(const std::string& node, const py::dict& inputs, py::obje
     auto found = setups().find(node);
     if (found == setups().end()) throw std::invalid_argument("no closure is called " + node);
     Closures out;
-    out.context = {vec3_of(n), vec3_of(ng), normalize(vec3_of(wo)), path_flags,
+    out.context = {vec3_of(n),          vec3_of(ng),         normalize(vec3_of(wo)), path_flags,
                    caustics_reflective, caustics_refractive, bump_correction};
     clear_closures(out.set);
     Inputs in(inputs);
@@ -287,11 +294,15 @@ void bind_bsdf(py::module_& m) {
                  BsdfValue v = closure_albedo(c.set, c.context.wo);
                  return py::make_tuple(tuple_of(v.diffuse), tuple_of(v.glossy), tuple_of(v.transmission));
              })
-        .def("limit_lobes", [](Closures& c, int copies) {
-            for (int i = 0; i < copies; ++i)
-                setup_diffuse(c.set, make_vec3(1.0f / static_cast<float>(i + 1)), make_vec3(1.0f), 0.0f, make_vec3(0.0f), c.context);
-            return c.set.count;
-        }, "Adds diffuse lobes of falling weight; returns how many lobes the set holds.");
+        .def(
+            "limit_lobes",
+            [](Closures& c, int copies) {
+                for (int i = 0; i < copies; ++i)
+                    setup_diffuse(c.set, make_vec3(1.0f / static_cast<float>(i + 1)), make_vec3(1.0f), 0.0f,
+                                  make_vec3(0.0f), c.context);
+                return c.set.count;
+            },
+            "Adds diffuse lobes of falling weight; returns how many lobes the set holds.");
 }
 
 }  // namespace luch::bindings

@@ -1,9 +1,9 @@
 // The list of lobes as the integrator sees it: evaluate, sample, blur, and what the passes show.
 #pragma once
+#include "luch/bsdf/ashikhmin_shirley.h"
 #include "luch/bsdf/bump_shadow.h"
 #include "luch/bsdf/diffuse.h"
 #include "luch/bsdf/microfacet.h"
-#include "luch/bsdf/ashikhmin_shirley.h"
 #include "luch/bsdf/sheen.h"
 
 namespace luch {
@@ -18,10 +18,14 @@ LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
         case LobeType::DIFFUSE:
         case LobeType::OREN_NAYAR:
         case LobeType::TRANSLUCENT:
-        case LobeType::SHEEN: return CLASS_DIFFUSE;
-        case LobeType::MICROFACET_REFRACTION: return CLASS_TRANSMISSION;
-        case LobeType::MICROFACET_GLASS: return dot(lobe.normal, wi) > 0.0f ? CLASS_GLOSSY : CLASS_TRANSMISSION;
-        default: return lobe.flags & LOBE_MIRRORED ? CLASS_TRANSMISSION : CLASS_GLOSSY;
+        case LobeType::SHEEN:
+            return CLASS_DIFFUSE;
+        case LobeType::MICROFACET_REFRACTION:
+            return CLASS_TRANSMISSION;
+        case LobeType::MICROFACET_GLASS:
+            return dot(lobe.normal, wi) > 0.0f ? CLASS_GLOSSY : CLASS_TRANSMISSION;
+        default:
+            return lobe.flags & LOBE_MIRRORED ? CLASS_TRANSMISSION : CLASS_GLOSSY;
     }
 }
 
@@ -32,16 +36,24 @@ LUCH_FN void add_to_class(BsdfValue& value, LobeClass which, Color light) {
 
 LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
     switch (lobe.type) {
-        case LobeType::DIFFUSE: return eval_diffuse(lobe, wi);
-        case LobeType::OREN_NAYAR: return eval_oren_nayar(lobe, wo, wi);
-        case LobeType::TRANSLUCENT: return eval_translucent(lobe, wi);
-        case LobeType::SHEEN: return eval_sheen(lobe, wi);
-        case LobeType::ASHIKHMIN_SHEEN: return eval_velvet(lobe, wo, wi);
-        case LobeType::ASHIKHMIN_SHIRLEY: return eval_ashikhmin_shirley(lobe, wo, wi);
+        case LobeType::DIFFUSE:
+            return eval_diffuse(lobe, wi);
+        case LobeType::OREN_NAYAR:
+            return eval_oren_nayar(lobe, wo, wi);
+        case LobeType::TRANSLUCENT:
+            return eval_translucent(lobe, wi);
+        case LobeType::SHEEN:
+            return eval_sheen(lobe, wi);
+        case LobeType::ASHIKHMIN_SHEEN:
+            return eval_velvet(lobe, wo, wi);
+        case LobeType::ASHIKHMIN_SHIRLEY:
+            return eval_ashikhmin_shirley(lobe, wo, wi);
         case LobeType::MICROFACET_REFLECTION:
         case LobeType::MICROFACET_REFRACTION:
-        case LobeType::MICROFACET_GLASS: return eval_microfacet(lobe, wo, wi);
-        case LobeType::NONE_: break;
+        case LobeType::MICROFACET_GLASS:
+            return eval_microfacet(lobe, wo, wi);
+        case LobeType::NONE_:
+            break;
     }
     return no_value();
 }

@@ -45,14 +45,22 @@ LUCH_FN FacetAngles facet_angles(const Lobe& l, Vec3 o, Vec3 i, Vec3 h) {
     float ax2 = sqr(l.alpha_x), ay2 = sqr(l.alpha_y);
     // Refraction has no anisotropy: the mean roughness serves.
     if (i.z < 0.0f) ax2 = ay2 = l.alpha_x * l.alpha_y;
-    return {o.z, i.z, h.z, ax2 * sqr(o.x) + ay2 * sqr(o.y), ax2 * sqr(i.x) + ay2 * sqr(i.y),
+    return {o.z,
+            i.z,
+            h.z,
+            ax2 * sqr(o.x) + ay2 * sqr(o.y),
+            ax2 * sqr(i.x) + ay2 * sqr(i.y),
             sqr(h.x) / ax2 + sqr(h.y) / ay2};
 }
 // The same of an isotropic lobe, which needs no frame.
 LUCH_FN FacetAngles facet_angles_isotropic(const Lobe& l, Vec3 h, float cos_o, float cos_i) {
     float a2 = l.alpha_x * l.alpha_y;
     Vec3 across = cross(l.normal, h);  // 1 - cos^2 would lose the sharpest lobes to rounding
-    return {cos_o, cos_i, dot(l.normal, h), a2 * (1.0f - sqr(cos_o)), a2 * (1.0f - sqr(cos_i)),
+    return {cos_o,
+            cos_i,
+            dot(l.normal, h),
+            a2 * (1.0f - sqr(cos_o)),
+            a2 * (1.0f - sqr(cos_i)),
             length_squared(across) / a2};
 }
 
@@ -140,8 +148,9 @@ LUCH_FN_SLOW LobeSample sample_microfacet(const Lobe& l, Vec3 n_geometric, Vec3 
     bool mirror = is_mirror(l);
     Vec3 h = {0.0f, 0.0f, 1.0f};
     if (!mirror) {
-        h = l.distribution == Distribution::GGX ? sample_visible_ggx(l, o, uses_cap_bound(l) ? cap_bound(l, o.z) : 1.0f, u)
-                                                : sample_visible_beckmann(o, l.alpha_x, l.alpha_y, u);
+        h = l.distribution == Distribution::GGX
+                ? sample_visible_ggx(l, o, uses_cap_bound(l) ? cap_bound(l, o.z) : 1.0f, u)
+                : sample_visible_beckmann(o, l.alpha_x, l.alpha_y, u);
     }
     float cos_ho = dot(h, o);
     FresnelTerm fresnel = fresnel_term(l, cos_ho);

@@ -30,8 +30,18 @@ LUCH_FN PrincipledSurface read_principled(const PrincipledParams& p, const Setup
     Vec3 coat_n = is_zero(p.coat_normal) ? n : closure_normal(p.coat_normal, c);
     Color base = max_v(p.base_color, none);
     float film_ior = p.thin_film_thickness > FILM_MIN_THICKNESS_NM ? valid_ior(p.thin_film_ior) : 0.0f;
-    return {p, c, n, specular_normal(n, c), coat_n, base, min_v(base, make_vec3(1.0f)), max_v(p.specular_tint, none),
-            valid_ior(p.ior), saturate_f(p.roughness), p.thin_film_thickness, film_ior};
+    return {p,
+            c,
+            n,
+            specular_normal(n, c),
+            coat_n,
+            base,
+            min_v(base, make_vec3(1.0f)),
+            max_v(p.specular_tint, none),
+            valid_ior(p.ior),
+            saturate_f(p.roughness),
+            p.thin_film_thickness,
+            film_ior};
 }
 
 LUCH_FN Color layer_sheen(ClosureSet& set, Color weight, const PrincipledSurface& s) {
@@ -60,8 +70,7 @@ LUCH_FN Color layer_coat(ClosureSet& set, Color weight, const PrincipledSurface&
     float ior = clamp_f(s.p.coat_ior, 1.0f, 1e6f);
     Vec3 n = specular_normal(s.coat_n, s.c);
     Lobe lobe;
-    if (allows_reflective_caustics(s.c) &&
-        start_lobe(lobe, LobeType::MICROFACET_REFLECTION, amount * weight, n, s.c)) {
+    if (allows_reflective_caustics(s.c) && start_lobe(lobe, LobeType::MICROFACET_REFLECTION, amount * weight, n, s.c)) {
         lobe.ior = ior;
         lobe.fresnel = Fresnel::DIELECTRIC;
         make_isotropic(lobe, sqr(saturate_f(s.p.coat_roughness)));
@@ -102,8 +111,7 @@ LUCH_FN Color mix_glass(ClosureSet& set, Color weight, const PrincipledSurface& 
     Lobe lobe;
     if (!reflects && !refracts) {
     } else if (s.p.thin_wall) {
-        ThinGlass sheet = {s.ior,      sqr(s.roughness), s.film_thickness,
-                           s.film_ior, s.specular_tint,  s.clamped_base};
+        ThinGlass sheet = {s.ior, sqr(s.roughness), s.film_thickness, s.film_ior, s.specular_tint, s.clamped_base};
         setup_thin_glass(set, amount * weight, sheet, s.specular_n, s.c);
     } else if (start_lobe(lobe, LobeType::MICROFACET_GLASS, amount * weight, s.specular_n, s.c)) {
         const Color none = make_vec3(0.0f);

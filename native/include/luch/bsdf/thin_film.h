@@ -4,8 +4,8 @@
 // Varying Iridescence".
 #pragma once
 #include "luch/bsdf/closure.h"
-#include "luch/bsdf/fresnel.h"
 #include "luch/bsdf/film_table.h"
+#include "luch/bsdf/fresnel.h"
 
 namespace luch {
 
@@ -97,8 +97,8 @@ LUCH_FN float film_over_conductor(const FilmPath& f, int channel, float n, float
     }
     float nk = 2.0f * n * k, nn_kk = n * n - k * k;
     Complex s = unit_phase(sqr(f.ior * c) - w.u2 - w.v2, -2.0f * f.ior * c * w.v);
-    Complex p = unit_phase(sqr((n * n + k * k) * c) - sqr(f.ior) * (w.u2 + w.v2),
-                           2.0f * f.ior * c * (nk * w.u - nn_kk * w.v));
+    Complex p =
+        unit_phase(sqr((n * n + k * k) * c) - sqr(f.ior) * (w.u2 + w.v2), 2.0f * f.ior * c * (nk * w.u - nn_kk * w.v));
     float turn_s = -turn_over(f.upper.s), turn_p = -turn_over(f.upper.p);
     float sum = airy_sum(channel, sqr(f.upper.s), lower.s, f.path_nm, {s.re * turn_s, s.im * turn_s}) +
                 airy_sum(channel, sqr(f.upper.p), lower.p, f.path_nm, {p.re * turn_p, p.im * turn_p});

@@ -38,8 +38,8 @@ LUCH_FN SheetShares sheet_shares(const ThinGlass& g, bool reflects, bool refract
         back = sheet_face(g, 1.0f / g.ior, g.film_ior / g.ior, reflects, refracts, front.cos_t);
     // Beer's law along the slanted way through the sheet.
     float slant = front.cos_t > 0.0f ? 1.0f / front.cos_t : 0.0f;
-    Color once = slant > 0.0f ? make_vec3(pow_f(g.color.x, slant), pow_f(g.color.y, slant), pow_f(g.color.z, slant))
-                              : none;
+    Color once =
+        slant > 0.0f ? make_vec3(pow_f(g.color.x, slant), pow_f(g.color.y, slant), pow_f(g.color.z, slant)) : none;
     // Both are geometric series over the reflections inside.
     Color inside = back.reflected * once;
     Color rest = one - inside * inside, across = once * front.transmitted * back.transmitted;
