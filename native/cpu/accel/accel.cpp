@@ -8,12 +8,15 @@
 
 #include "cpu/accel/build_bvh8.h"
 #include "cpu/accel/group.h"
+#include "cpu/accel/interleave.h"
 #include "cpu/accel/traverse.h"
 
 namespace luch::cpu {
 namespace {
 
 constexpr float LARGEST = 3.402823466e+38f;
+constexpr Hit MISS = {INFINITE_DISTANCE, NONE, NONE, 0.0f, 0.0f};
+constexpr u32 BATCH = 1024;  // rays looked at together
 // A mesh with one user, or so small that its copies weigh little, is taken to the world: no transform per
 // ray, no overlapping boxes. One tree holds all such instances of equal visibility.
 constexpr u64 FLATTEN_TRIANGLES = 4096;
@@ -77,6 +80,8 @@ class TwoLevel final : public Accel {
     void closest_in_entry(const Entry& entry, const Ray& ray, Hit* hit) const;
     u8 any_in_entry(const Entry& entry, const Ray& ray) const;
     Hit closest_one(const Ray& ray, u32 kinds) const;
+    Hit world_hit(const Group& group, const GroupHit& hit) const;
+    void closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const;
     u8 any_one(const Ray& ray, u32 kinds) const;
 
     std::vector<Group> groups_;
@@ -241,15 +246,15 @@ u8 TwoLevel::any_in_entry(const Entry& entry, const Ray& ray) const {
 }
 
 Hit TwoLevel::closest_one(const Ray& ray, u32 kinds) const {
-    constexpr Hit MISS = {INFINITE_DISTANCE, NONE, NONE, 0.0f, 0.0f};
     if (!ray_is_valid(ray)) return MISS;
     Hit best = {min_f(ray.t_max, LARGEST), NONE, NONE, 0.0f, 0.0f};
     auto visit = [&](u32 first, u32 count) {
         for (u32 e = first; e < first + count; ++e)
             if (entries_[e].visibility & kinds) closest_in_entry(entries_[e], ray, &best);
     };
+    auto visit_leaf = [&](u32 leaf) { visit(leaf_first(leaf), leaf_items(leaf)); };
     if (top_.size())
-        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), &best.t, visit);
+        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), &best.t, visit_leaf);
     else
         visit(0, u32(entries_.size()));
     return best.prim == NONE ? MISS : best;
@@ -264,15 +269,46 @@ u8 TwoLevel::any_one(const Ray& ray, u32 kinds) const {
                 if (u8 blocked = any_in_entry(entries_[e], ray)) result = blocked;
         return result == BLOCKED_OPAQUE;
     };
+    auto visit_leaf = [&](u32 leaf) { return visit(leaf_first(leaf), leaf_items(leaf)); };
     if (top_.size())
-        visit_any(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), ray.t_max, visit);
+        visit_any(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), ray.t_max, visit_leaf);
     else
         visit(0, u32(entries_.size()));
     return result;
 }
 
+Hit TwoLevel::world_hit(const Group& group, const GroupHit& hit) const {
+    if (hit.ref == NONE) return MISS;
+    const Member& member = group.member_of(hit.ref);
+    return {hit.t, hit.ref - member.first_ref, member.instance, hit.u, hit.v};
+}
+
+// All is one group in the world: its rays can be interleaved.
+void TwoLevel::closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const {
+    const Group& group = groups_[entries_[0].group];
+    GroupHit found[BATCH];
+    u32 valid[BATCH] = {}, valid_count = 0;
+    for (u32 i = 0; i < count; ++i) {
+        found[i] = {min_f(rays[i].t_max, LARGEST), NONE, 0.0f, 0.0f};
+        bool sees = !ray_kinds || (ray_kinds[i] & entries_[0].visibility);
+        if (sees && ray_is_valid(rays[i])) valid[valid_count++] = i;
+    }
+    closest_interleaved(group, rays, valid, valid_count, found);
+    for (u32 i = 0; i < count; ++i) hits[i] = world_hit(group, found[i]);
+}
+
 void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const {
-    for (size_t i = 0; i < count; ++i) hits[i] = closest_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL));
+    const Group* one = entries_.size() == 1 && entries_[0].instance == NONE ? &groups_[entries_[0].group] : nullptr;
+    for (size_t first = 0; first < count; first += BATCH) {
+        u32 size = u32(std::min<size_t>(BATCH, count - first));
+        const u32* kinds = ray_kinds ? ray_kinds + first : nullptr;
+        if (one && one->nodes.size() && rays_are_scattered(rays + first, size, one->root)) {
+            closest_scattered(rays + first, kinds, hits + first, size);
+            continue;
+        }
+        for (size_t i = first; i < first + size; ++i)
+            hits[i] = closest_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL));
+    }
 }
 
 void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const {

@@ -2,12 +2,11 @@
 #include "cpu/accel/group.h"
 
 #include "cpu/accel/accel.h"
+#include "cpu/accel/leaf.h"
 #include "cpu/accel/traverse.h"
 
 namespace luch::cpu {
 namespace {
-
-bool is_closer(float t, u32 ref, const GroupHit& best) { return t < best.t || (t == best.t && ref < best.ref); }
 
 struct Rays {
     NodeRay node;
@@ -34,48 +33,26 @@ void for_each_hit(const Group& group, const TriangleRay& ray, float t_min, float
 }  // namespace
 
 void closest_in_group(const Group& group, const LaneRay& ray, float t_min, GroupHit* best) {
-    auto offer = [best](float t, u32 ref, float u, float v) {
-        if (is_closer(t, ref & REF_MASK, *best)) *best = {t, ref & REF_MASK, u, v};
-    };
     if (group.nodes.size() == 0) {
         for_each_hit(group, make_triangle_ray(ray.origin3(), ray.direction3()), t_min, best->t,
-                     [&](const TriangleHit& hit, u32 ref) { offer(hit.t, ref, hit.u, hit.v); });
+                     [&](const TriangleHit& hit, u32 ref) { offer(hit.t, ref, hit.u, hit.v, best); });
         return;
     }
     Rays rays(group, ray, t_min);
-    visit_closest(group.nodes.data(), rays.node, &best->t, [&](u32 first, u32 count) {
-        for (u32 b = first; b < first + count; ++b) {
-            const Block4& block = group.blocks[b];
-            BlockHits hits;
-            for (u32 mask = intersect_block(block, rays.block, best->t, &hits); mask; mask &= mask - 1) {
-                u32 lane = u32(__builtin_ctz(mask));
-                offer(hits.t[lane], block.ref[lane], hits.u[lane], hits.v[lane]);
-            }
-        }
-    });
+    visit_closest(group.nodes.data(), rays.node, &best->t,
+                  [&](u32 leaf) { closest_in_leaf(group, rays.block, leaf, best); });
 }
 
 u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max) {
     u8 result = BLOCKED_NOT;
-    auto note = [&result](u32 ref) {
-        if (!(ref & REF_TRANSPARENT))
-            result = BLOCKED_OPAQUE;
-        else if (result == BLOCKED_NOT)
-            result = BLOCKED_MAYBE;
-    };
     if (group.nodes.size() == 0) {
         for_each_hit(group, make_triangle_ray(ray.origin3(), ray.direction3()), t_min, t_max,
-                     [&](const TriangleHit&, u32 ref) { note(ref); });
+                     [&](const TriangleHit&, u32 ref) { note_blocked(ref, &result); });
         return result;
     }
     Rays rays(group, ray, t_min);
-    visit_any(group.nodes.data(), rays.node, t_max, [&](u32 first, u32 count) {
-        for (u32 b = first; b < first + count; ++b) {
-            const Block4& block = group.blocks[b];
-            BlockHits hits;
-            for (u32 mask = intersect_block(block, rays.block, t_max, &hits); mask; mask &= mask - 1)
-                note(block.ref[__builtin_ctz(mask)]);
-        }
+    visit_any(group.nodes.data(), rays.node, t_max, [&](u32 leaf) {
+        any_in_leaf(group, rays.block, leaf, t_max, &result);
         return result == BLOCKED_OPAQUE;
     });
     return result;

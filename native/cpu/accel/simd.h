@@ -6,6 +6,9 @@
 #endif
 #include "luch/platform.h"
 
+// Wide vectors are passed to functions only where these are inlined: their calling convention does not matter.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 namespace luch::cpu {
 
 using f4 = float __attribute__((vector_size(16)));

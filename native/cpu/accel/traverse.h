@@ -219,7 +219,7 @@ LUCH_FN u32 push_children(const Node8& node, u32 mask, f8 entry, u64** top_of_st
     return nearest;
 }
 
-// Calls leaf(first item, items) nearest leaves first; leaf lowers *t_max when it finds a hit. Boxes entered
+// Calls leaf(its child word) nearest leaves first; leaf lowers *t_max when it finds a hit. Boxes entered
 // at exactly t_max are still visited: a hit there may have the smaller id.
 template <class Leaf>
 LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* t_max, Leaf&& leaf) {
@@ -234,7 +234,7 @@ LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* 
             if (!mask) goto pop;
             current = push_children(node, mask, entry, &top);
         }
-        leaf(current & LEAF_FIRST_MASK, ((current >> LEAF_COUNT_SHIFT) & (LEAF_MAX_ITEMS - 1)) + 1);
+        leaf(current);
     pop:
         do {
             if (top == stack) return;
@@ -244,7 +244,7 @@ LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* 
     }
 }
 
-// Calls leaf(first item, items) in no particular order until it returns true.
+// Calls leaf(its child word) in no particular order until it returns true.
 template <class Leaf>
 LUCH_FN void visit_any(const Node8* nodes, const NodeRay& ray, float t_max, Leaf&& leaf) {
     u32 stack[STACK_SIZE];
@@ -262,7 +262,7 @@ LUCH_FN void visit_any(const Node8* nodes, const NodeRay& ray, float t_max, Leaf
             });
             for (mask &= mask - 1; mask; mask &= mask - 1) *top++ = node.child[__builtin_ctz(mask)];
         }
-        if (leaf(current & LEAF_FIRST_MASK, ((current >> LEAF_COUNT_SHIFT) & (LEAF_MAX_ITEMS - 1)) + 1)) return;
+        if (leaf(current)) return;
     pop:
         if (top == stack) return;
         current = *--top;

@@ -1,0 +1,42 @@
+// A leaf of a group's tree: its blocks against one ray.
+#pragma once
+#include "cpu/accel/accel.h"
+#include "cpu/accel/group.h"
+#include "cpu/accel/traverse.h"
+
+namespace luch::cpu {
+
+LUCH_FN bool is_closer(float t, u32 ref, const GroupHit& best) { return t < best.t || (t == best.t && ref < best.ref); }
+LUCH_FN void offer(float t, u32 ref, float u, float v, GroupHit* best) {
+    if (is_closer(t, ref & REF_MASK, *best)) *best = {t, ref & REF_MASK, u, v};
+}
+LUCH_FN void note_blocked(u32 ref, u8* result) {
+    if (!(ref & REF_TRANSPARENT))
+        *result = BLOCKED_OPAQUE;
+    else if (*result == BLOCKED_NOT)
+        *result = BLOCKED_MAYBE;
+}
+
+LUCH_FN void closest_in_leaf(const Group& group, const BlockRay& ray, u32 leaf, GroupHit* best) {
+    u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
+    for (u32 b = first; b < end; ++b) {
+        const Block4& block = group.blocks[b];
+        BlockHits hits;
+        for (u32 mask = intersect_block(block, ray, best->t, &hits); mask; mask &= mask - 1) {
+            u32 lane = u32(__builtin_ctz(mask));
+            offer(hits.t[lane], block.ref[lane], hits.u[lane], hits.v[lane], best);
+        }
+    }
+}
+
+LUCH_FN void any_in_leaf(const Group& group, const BlockRay& ray, u32 leaf, float t_max, u8* result) {
+    u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
+    for (u32 b = first; b < end; ++b) {
+        const Block4& block = group.blocks[b];
+        BlockHits hits;
+        for (u32 mask = intersect_block(block, ray, t_max, &hits); mask; mask &= mask - 1)
+            note_blocked(block.ref[__builtin_ctz(mask)], result);
+    }
+}
+
+}  // namespace luch::cpu
