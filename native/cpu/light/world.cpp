@@ -7,6 +7,8 @@
 namespace luch::cpu {
 namespace {
 
+constexpr double EVEN_WORLD_SHARE = 0.02;
+
 float usable_luminance(Color c) {
     float l = luminance(abs_v(c));
     return finite_f(l) ? l : 0.0f;  // a broken texel must not own the map
@@ -25,16 +27,35 @@ void fill_cdf(const std::vector<double>& masses, float* cdf) {
     cdf[masses.size()] = 1.0f;
 }
 
-double build_map(const WorldInput& in, WorldArrays* a) {
-    const size_t width = static_cast<size_t>(in.map_width), height = static_cast<size_t>(in.map_height);
-    a->density.resize(width * height);
+// Fills density with luminance times cosine of what rises above the mean: rays that leave by the BSDF find the even
+// part well enough by themselves, and samples spent on it are lost to the rest (MIS compensation, Karlik et al. 2019).
+// Returns the mean luminance over the sphere.
+double fill_density(const WorldInput& in, size_t width, size_t height, std::vector<float>* density) {
+    density->resize(width * height);
+    double sum = 0.0, weight = 0.0;
+    std::vector<double> cosines(height);
     for (size_t y = 0; y < height; ++y) {
-        double latitude = 3.14159265358979 * ((static_cast<double>(y) + 0.5) / static_cast<double>(height) - 0.5);
+        cosines[y] = std::cos(3.14159265358979 * ((static_cast<double>(y) + 0.5) / static_cast<double>(height) - 0.5));
         for (size_t x = 0; x < width; ++x) {
             const float* c = in.map_rgb + 3 * (y * width + x);
-            a->density[y * width + x] = usable_luminance({c[0], c[1], c[2]}) * static_cast<float>(std::cos(latitude));
+            float l = usable_luminance({c[0], c[1], c[2]});
+            (*density)[y * width + x] = l;
+            sum += l * cosines[y];
+            weight += cosines[y];
         }
     }
+    double mean = sum / weight;
+    for (size_t i = 0; i < density->size(); ++i) {
+        double rise = std::fmax((*density)[i] - mean, 0.0) * cosines[i / width];
+        (*density)[i] = static_cast<float>(rise);
+    }
+    return mean;
+}
+
+// Returns the integral of the density before it is normalised.
+double build_map(const WorldInput& in, double* mean, WorldArrays* a) {
+    const size_t width = static_cast<size_t>(in.map_width), height = static_cast<size_t>(in.map_height);
+    *mean = fill_density(in, width, height, &a->density);
     std::vector<double> rows(height + 1), columns(width);
     a->row_cdf.resize(height + 2);
     a->column_cdf.resize((height + 1) * (width + 1));
@@ -69,16 +90,20 @@ WorldLight build_world(const WorldInput& in, WorldArrays* arrays) {
     w.lightgroup = in.lightgroup;
     if (!in.present) return w;
     w.radiance = finite_v(in.constant_radiance) ? in.constant_radiance : Color{0.0f, 0.0f, 0.0f};
-    double map_irradiance = PI * usable_luminance(w.radiance);
+    double mean = usable_luminance(w.radiance), rise = 0.0;
     if (!w.constant) {
         // Mean over the sphere is integral * pi / 2 (the density holds a cosine whose mean is 2 / pi).
-        map_irradiance = build_map(in, arrays) * 3.14159265358979 * 3.14159265358979 / 2.0;
+        rise = build_map(in, &mean, arrays) * 3.14159265358979 / 2.0;
         w.width = static_cast<u32>(in.map_width);
         w.height = static_cast<u32>(in.map_height);
         w.density = arrays->density.data();
         w.row_cdf = arrays->row_cdf.data();
         w.column_cdf = arrays->column_cdf.data();
+        w.constant = !(rise > 0.02 * mean);  // as good as even
     }
+    // Only what the map's samples are for counts against the other lights; an even world hardly does: sampled
+    // light from it is worth no more than what rays find there, and each such sample is one less for a lamp.
+    double map_irradiance = 3.14159265358979 * (w.constant ? EVEN_WORLD_SHARE * mean : rise);
     double sine = std::sin(0.25 * in.sun_angle), disk = std::sin(0.5 * in.sun_angle);
     double sun_irradiance = in.has_sun ? 3.14159265358979 * disk * disk * usable_luminance(in.sun_radiance) : 0.0;
     w.has_sun = sun_irradiance > 0.0 && in.sun_angle > 1e-6f;

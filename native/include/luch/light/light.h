@@ -89,7 +89,7 @@ struct WorldLight {
     const float* density;       // height * width, per unit square of (longitude, latitude): see light/world.h
     const float* row_cdf;       // height + 2
     const float* column_cdf;    // (height + 1) * (width + 1)
-    float irradiance;           // pi times the mean luminance; 0: never sampled
+    float irradiance;           // that sampling is for, luminance; 0: never sampled
     u32 visibility, lightgroup;
     bool has_sun;               // an extra cone around the sun of a sky texture
     Vec3 sun_direction;

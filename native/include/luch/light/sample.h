@@ -2,7 +2,8 @@
 // the chosen one; and, for a ray that found an emitter by itself, the density of that very choice.
 //
 // Three groups: local emitters (under the light tree), suns, the world. Shares follow rough unoccluded irradiance,
-// with a quarter dealt evenly, since what hides a group (a roof, a wall) is not known here.
+// with a part dealt evenly, since what hides a group (a roof, a wall) is not known here. An even world has no part in
+// that: rays find it by themselves.
 #pragma once
 #include "luch/light/closest_lamp.h"
 #include "luch/light/tree.h"
@@ -11,7 +12,7 @@
 
 namespace luch {
 
-inline constexpr float EVEN_SHARE = 0.25f;
+inline constexpr float EVEN_SHARE = 0.15f;
 
 struct GroupShares {
     float local, suns, world;         // probabilities; all 0: nothing to sample
@@ -58,13 +59,16 @@ LUCH_FN_SLOW void group_shares(const LightsView& lights, const LightQuery& q, Gr
     if (lights.sun_count > 0u) s->suns = suns_importance(lights, q);
     if (any_world) s->world = lights.world.irradiance;
     float total = s->local + s->suns + s->world;
-    float active = (s->local > 0.0f ? 1.0f : 0.0f) + (s->suns > 0.0f ? 1.0f : 0.0f) + (s->world > 0.0f ? 1.0f : 0.0f);
+    bool even_world = lights.world.constant && !lights.world.has_sun;
+    float active = (s->local > 0.0f ? 1.0f : 0.0f) + (s->suns > 0.0f ? 1.0f : 0.0f) +
+                   (s->world > 0.0f && !even_world ? 1.0f : 0.0f);
     bool usable = total > 0.0f && finite_f(total);
-    float even = usable ? EVEN_SHARE / active : 0.0f;
-    float scale = usable ? (1.0f - EVEN_SHARE) / total : 0.0f;
+    bool deal = usable && active > 0.0f;
+    float even = deal ? EVEN_SHARE / active : 0.0f;
+    float scale = usable ? (deal ? 1.0f - EVEN_SHARE : 1.0f) / total : 0.0f;
     s->local = s->local > 0.0f ? s->local * scale + even : 0.0f;
     s->suns = s->suns > 0.0f ? s->suns * scale + even : 0.0f;
-    s->world = s->world > 0.0f ? s->world * scale + even : 0.0f;
+    s->world = s->world > 0.0f ? s->world * scale + (even_world ? 0.0f : even) : 0.0f;
 }
 
 // ---- choosing ------------------------------------------------------------------------------------
