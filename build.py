@@ -53,13 +53,18 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("-o", "--output", required=True, help="PATH.luch")
     export.add_argument("--frame", type=int, help="frame to export (default: the file's current one)")
 
-    add("test", "Run the tests. Other arguments go to pytest, e.g. -k lights.", passes_on=True)
+    test = add("test", "Run the tests. Other arguments go to pytest, e.g. -k lights.", passes_on=True)
+    test.add_argument("--sanitize", action="store_true", help="only tests/native, with AddressSanitizer and UBSan")
     bench = add("bench", "Race and compare; other arguments go to the bench. No name: list them.", passes_on=True)
     bench.add_argument("name", nargs="?", help="a file in tests/bench, without .py")
     add("check", "The gate of the house: format, lint, spelling, architecture, types, headers.")
     package = add("package", "Build and validate the extension zip under dist/.")
     package.add_argument(
-        "--python", default="", help="also build for this Python, e.g. /usr/bin/python3.14 (repeat by ,)"
+        "--headers",
+        action="append",
+        default=[],
+        metavar="TAG=FOLDER",
+        help="a wheel for another Python too, from the folder of its Python.h, e.g. cp314=/usr/include/python3.14",
     )
     clean = add("clean", "Remove build products (keeps .venv).", compiles=False)
     clean.add_argument("--all", action="store_true", help="remove .venv too")

@@ -8,10 +8,10 @@ import shutil
 from pathlib import Path
 from typing import List
 
-from buildtools.compile_core import compile_core
+from buildtools.compile_core import compile_core, compile_sanitized
 from buildtools.failure import BuildFailure
 from buildtools.places import DIST, NATIVE, OUT, ROOT, VENV, VENV_PYTHON
-from buildtools.run import status
+from buildtools.run import output, status
 from buildtools.setup_venv import ensure_environment
 
 Arguments = argparse.Namespace
@@ -30,7 +30,7 @@ def setup(arguments: Arguments) -> int:
 
 def build(arguments: Arguments) -> int:
     ensure_environment()
-    compile_core(arguments.isa, arguments.jobs, arguments.sanitize)
+    compile_core(arguments.isa, arguments.jobs)
     return 0
 
 
@@ -52,8 +52,25 @@ def export(arguments: Arguments) -> int:
 
 
 def test(arguments: Arguments) -> int:
+    if arguments.sanitize:
+        return _test_sanitized(arguments)
     _prepare(arguments)
     return status([str(VENV_PYTHON), "-m", "pytest", *arguments.rest])
+
+
+def _test_sanitized(arguments: Arguments) -> int:
+    """tests/native with every memory access and every undefined operation watched."""
+    ensure_environment()
+    folder = compile_sanitized(arguments.jobs)
+    asan = output(["c++", "-print-file-name=libasan.so"])
+    watched = {
+        "LD_PRELOAD": str(asan),  # Python itself is not built with it
+        "ASAN_OPTIONS": "detect_leaks=0",  # Python's own, at exit
+        "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1",
+        "LUCH_ISA": "v3",
+    }
+    command = [str(VENV_PYTHON), "-m", "pytest", "-o", f"pythonpath={folder} . tests", "-p", "no:cacheprovider"]
+    return status([*command, "-m", "not long", "tests/native", *arguments.rest], extra=watched)
 
 
 def bench(arguments: Arguments) -> int:
@@ -79,7 +96,9 @@ def package(arguments: Arguments) -> int:
     from buildtools.package import build_extension
 
     _prepare(arguments)  # the wheel is made from the same compilation
-    print(build_extension([python for python in arguments.python.split(",") if python], arguments.isa))
+    pairs = [text.partition("=") for text in arguments.headers]
+    headers = {tag: Path(folder).resolve() for tag, _, folder in pairs}
+    print(build_extension(arguments.isa, arguments.jobs, headers))
     return 0
 
 

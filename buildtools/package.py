@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
 import shutil
+import zipfile
 from pathlib import Path
-from typing import List
+from typing import Dict, List
 
-from buildtools.compile_core import core_options
+from buildtools.compile_core import configure_and_make, core_options
 from buildtools.failure import BuildFailure
 from buildtools.places import BUILD, DIST, NATIVE, ROOT, VENV_PYTHON
-from buildtools.run import output, require
+from buildtools.run import require
 
 STAGE = BUILD / "extension"
+WHEELS = DIST / "wheels"
 
 
-def build_extension(pythons: List[str], isas: str) -> Path:
-    """Path of the zip under dist/. pythons: further interpreters (with headers) to build a wheel for."""
-    wheels = DIST / "wheels"
-    shutil.rmtree(wheels, ignore_errors=True)
-    for python in [str(VENV_PYTHON), *pythons]:
-        _build_wheel(python, wheels, isas)
-    _stage_sources(sorted(wheels.glob("*.whl")))
+def build_extension(isas: str, jobs: int, headers: Dict[str, Path]) -> Path:
+    """Path of the zip under dist/. headers: further Pythons as tag -> folder with their Python.h ("cp314": ...)."""
+    shutil.rmtree(WHEELS, ignore_errors=True)
+    wheel = _build_wheel(isas)
+    for tag, folder in headers.items():
+        _build_wheel_for(tag, folder, wheel, isas, jobs)
+    _stage_sources(sorted(WHEELS.glob("*.whl")))
     blender_ext = _blender_ext()
     for old in DIST.glob("luch-*.zip"):
         old.unlink()
@@ -33,17 +37,54 @@ def build_extension(pythons: List[str], isas: str) -> Path:
     return archive
 
 
-def _build_wheel(python: str, wheels: Path, isas: str) -> None:
-    tag = output([python, "-c", "import sys; print('cp%d%d' % sys.version_info[:2])"])
-    if tag is None:
-        raise BuildFailure(f"{python} does not run")
+def _build_wheel(isas: str) -> Path:
+    """For .venv's Python, by scikit-build-core, from the build that is there already."""
     command = [str(VENV_PYTHON), "-m", "pip", "wheel", "-q", "--disable-pip-version-check", "--no-deps"]
-    command += ["--no-build-isolation", "-w", str(wheels), str(NATIVE)]
-    for option in core_options(isas, python):
+    command += ["--no-build-isolation", "-w", str(WHEELS), str(NATIVE), f"--config-settings=build-dir={BUILD}"]
+    for option in core_options(isas, str(VENV_PYTHON)):
         name, value = option[2:].split("=", 1)
         command.append(f"--config-settings=cmake.define.{name}={value}")
-    command.append(f"--config-settings=build-dir={BUILD}")
-    require(command, f"the wheel for {tag} was not built")
+    require(command, "the wheel was not built")
+    return next(WHEELS.glob("*.whl"))
+
+
+def _build_wheel_for(tag: str, headers: Path, wheel: Path, isas: str, jobs: int) -> None:
+    """The same wheel for a Python of which only the headers are here, such as that of a distribution's Blender."""
+    if not (headers / "Python.h").is_file():
+        raise BuildFailure(f"{headers}: no Python.h there; give the folder that holds it as --headers {tag}=FOLDER")
+    folder = ROOT / f".build-{tag}"
+    modules = folder / "modules"
+    suffix = f".cpython-{tag[2:]}-x86_64-linux-gnu.so"
+    options = [
+        *core_options(isas, str(VENV_PYTHON)),
+        f"-DPython_INCLUDE_DIR={headers}",
+        f"-DPYTHON_MODULE_EXTENSION={suffix}",
+        "-DPYTHON_MODULE_DEBUG_POSTFIX=",
+        f"-DLUCH_OUTPUT_DIR={modules}",
+    ]
+    configure_and_make(folder, options, jobs)
+    with zipfile.ZipFile(wheel) as source:
+        own_tag = wheel.name.split("-")[2]
+        entries = {
+            name: source.read(name).replace(own_tag.encode(), tag.encode())
+            for name in source.namelist()
+            if not name.endswith((".so", "RECORD"))
+        }
+        record = next(name for name in source.namelist() if name.endswith("RECORD"))
+    entries.update({f"luch/{path.name}": path.read_bytes() for path in sorted(modules.glob(f"_core_*{suffix}"))})
+    entries[record] = _record(entries, record)
+    with zipfile.ZipFile(wheel.with_name(wheel.name.replace(own_tag, tag)), "w", zipfile.ZIP_DEFLATED) as target:
+        for name, data in entries.items():
+            target.writestr(name, data)
+
+
+def _record(entries: Dict[str, bytes], record: str) -> bytes:
+    """A wheel's list of files with their hashes."""
+    lines = []
+    for name, data in entries.items():
+        digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+        lines.append(f"{name},sha256={digest},{len(data)}")
+    return "\n".join([*lines, f"{record},,", ""]).encode()
 
 
 def _stage_sources(wheels: List[Path]) -> None:

@@ -20,9 +20,9 @@ def environment() -> Dict[str, str]:
     return variables
 
 
-def status(command: List[str], cwd: Path = ROOT) -> int:
-    """Run with output passed through; the exit status."""
-    return subprocess.run(command, cwd=cwd, env=environment(), check=False).returncode
+def status(command: List[str], cwd: Path = ROOT, extra: Optional[Dict[str, str]] = None) -> int:
+    """Run with output passed through; the exit status. extra: more environment variables."""
+    return subprocess.run(command, cwd=cwd, env={**environment(), **(extra or {})}, check=False).returncode
 
 
 def require(command: List[str], failure: str, cwd: Path = ROOT) -> None:
