@@ -57,7 +57,7 @@ def sun_direction(elevation: float, rotation: float) -> tuple[float, float, floa
 
 @lru_cache(maxsize=4)
 def atmosphere_table(a: Atmosphere) -> F32:
-    """SkyAtmosphere as float32: 11 numbers of the sun, then (256, 256, 3) of the sky's left half."""
+    """SkyAtmosphere as float32: 14 numbers of the sun, then (256, 256, 3) of the sky's left half."""
     elevation, rotation = wrap_sun(a.sun_elevation, a.sun_rotation)
     diameter = max(a.sun_size, SMALLEST_SUN)
     bottom, top = (_disc_radiance(a, elevation + end * diameter, diameter) for end in (-0.5, 0.5))
@@ -65,7 +65,8 @@ def atmosphere_table(a: Atmosphere) -> F32:
     radiance = core.sky.radiance(a.multiple_scattering, elevation, a.altitude, *densities)
     horizon = np.arcsin(EARTH_RADIUS_M / (EARTH_RADIUS_M + a.altitude)) - np.pi / 2.0
     disc = diameter if a.sun_disc else -1.0
-    sun = [*bottom, *top, elevation, rotation, disc, a.sun_intensity, horizon]
+    direction = sun_direction(a.sun_elevation, a.sun_rotation)
+    sun = [*bottom, *top, *direction, elevation, rotation, disc, a.sun_intensity, horizon]
     return np.concatenate([np.array(sun, np.float32), radiance.ravel()])
 
 

@@ -17,8 +17,8 @@ template <class Op>
 void ImageOp<Op>::eval_lanes(const OpContext& c, const u32* params, const float* const* in, float* const* out,
                              int count) {
     alignas(64) float encoded[3][SHADE_LANES];
+    alignas(64) float is_srgb[SHADE_LANES];  // a float, not a bool: else the loop below does not vectorise
     bool srgb = false;
-    bool is_srgb[SHADE_LANES];
     OpContext context = c;
     for (int lane = 0; lane < count; lane++) {
         float read[Op::inputs];
@@ -29,7 +29,7 @@ void ImageOp<Op>::eval_lanes(const OpContext& c, const u32* params, const float*
         encoded[1][lane] = e.texel.g;
         encoded[2][lane] = e.texel.b;
         out[3][lane] = e.texel.a;
-        is_srgb[lane] = e.srgb;
+        is_srgb[lane] = e.srgb ? 1.0f : 0.0f;
         srgb |= e.srgb;
     }
     for (int k = 0; k < 3; k++) {
@@ -37,7 +37,7 @@ void ImageOp<Op>::eval_lanes(const OpContext& c, const u32* params, const float*
         if (srgb) {
             for (int lane = 0; lane < count; lane++) {
                 const float linear = srgb_to_linear(encoded[k][lane]);
-                color[lane] = is_srgb[lane] ? linear : encoded[k][lane];
+                color[lane] = is_srgb[lane] != 0.0f ? linear : encoded[k][lane];
             }
         } else {
             for (int lane = 0; lane < count; lane++) color[lane] = encoded[k][lane];

@@ -24,30 +24,24 @@ LUCH_FN float half_to_float(u16 h) {
     return bits_float(bits | sign);
 }
 
-// Channel k of the texel that starts at element `first`, byte images as 0..1.
-LUCH_FN float read_channel(const ImageView& image, u64 first, int k) {
-    if (image.format == PixelFormat::U8)
-        return float(static_cast<const u8*>(image.pixels)[first + u64(k)]) * (1.0f / 255.0f);
-    if (image.format == PixelFormat::F16) return half_to_float(static_cast<const u16*>(image.pixels)[first + u64(k)]);
-    return static_cast<const float*>(image.pixels)[first + u64(k)];
-}
+// One channel as a number, bytes as 0..1.
+LUCH_FN float read_channel(const u8* p) { return float(*p) * (1.0f / 255.0f); }
+LUCH_FN float read_channel(const u16* p) { return half_to_float(*p); }
+LUCH_FN float read_channel(const float* p) { return *p; }
 
 // 0 <= x < width, 0 <= y < height. Straight alpha of colours is multiplied in; data stays as it is.
+template <class Stored>
 LUCH_FN Texel read_texel(const ImageView& image, int x, int y) {
-    const u64 first = (u64(y) * image.width + u64(x)) * image.channels;
+    const Stored* p = static_cast<const Stored*>(image.pixels) + (u64(y) * image.width + u64(x)) * image.channels;
     Texel t;
-    t.r = read_channel(image, first, 0);
-    t.g = image.channels >= 3 ? read_channel(image, first, 1) : t.r;
-    t.b = image.channels >= 3 ? read_channel(image, first, 2) : t.r;
-    t.a = (image.channels & 1) == 0 ? read_channel(image, first, image.channels - 1) : 1.0f;
+    t.r = read_channel(p);
+    t.g = image.channels >= 3 ? read_channel(p + 1) : t.r;
+    t.b = image.channels >= 3 ? read_channel(p + 2) : t.r;
+    t.a = (image.channels & 1) == 0 ? read_channel(p + image.channels - 1) : 1.0f;
     const auto alpha = ImageAlpha(image.alpha);
     if (alpha == ImageAlpha::NONE_) t.a = 1.0f;
-    if (alpha == ImageAlpha::STRAIGHT && image.srgb && t.a != 1.0f) {
-        t.r *= t.a;
-        t.g *= t.a;
-        t.b *= t.a;
-    }
-    return t;
+    const float factor = alpha == ImageAlpha::STRAIGHT && image.srgb ? t.a : 1.0f;
+    return {t.r * factor, t.g * factor, t.b * factor, t.a};
 }
 
 // Pixel number at or below x (one lower for negative whole numbers, where the fraction is 1).
@@ -59,6 +53,7 @@ LUCH_FN int pixel_below(float x, float* fraction) {
 }
 
 LUCH_FN int wrap_pixel(int x, int size, Extension extension) {
+    if (u32(x) < u32(size)) return x;
     if (extension == Extension::REPEAT) {
         const int m = x % size;
         return m < 0 ? m + size : m;
@@ -71,18 +66,23 @@ LUCH_FN int wrap_pixel(int x, int size, Extension extension) {
 }
 
 // N weighted texels per axis, the first at (x, y).
-template <int N>
+template <class Stored, int N>
 LUCH_FN Texel blend_texels(const ImageView& image, int x, int y, const float (&wx)[N], const float (&wy)[N],
                            Extension extension) {
     const int width = int(image.width), height = int(image.height);
     const bool clip = extension == Extension::CLIP;
+    int column[N];
+    float weight[N];
+    for (int i = 0; i < N; i++) {
+        column[i] = wrap_pixel(x + i, width, extension);
+        weight[i] = clip && column[i] != x + i ? 0.0f : wx[i];
+    }
     Texel sum{0.0f, 0.0f, 0.0f, 0.0f};
     for (int j = 0; j < N; j++) {
-        if (clip && (y + j < 0 || y + j >= height)) continue;
         const int row = wrap_pixel(y + j, height, extension);
+        const float row_weight = clip && row != y + j ? 0.0f : wy[j];
         for (int i = 0; i < N; i++) {
-            if (clip && (x + i < 0 || x + i >= width)) continue;
-            sum = sum + read_texel(image, wrap_pixel(x + i, width, extension), row) * (wx[i] * wy[j]);
+            sum = sum + read_texel<Stored>(image, column[i], row) * (weight[i] * row_weight);
         }
     }
     return sum;
@@ -97,25 +97,33 @@ LUCH_FN void cubic_weights(float t, float (&w)[4]) {
     w[3] = t * t * t * (1.0f / 6.0f);
 }
 
-// The stored value at (u, v), 0..1 over the image, v upwards.
-LUCH_FN_SLOW Texel look_up_image(const ImageView& image, float u, float v, Interpolation interpolation,
-                                 Extension extension) {
-    const float x = u * float(image.width), y = v * float(image.height);
+template <class Stored>
+LUCH_FN Texel interpolate_image(const ImageView& image, float x, float y, Interpolation interpolation,
+                                Extension extension) {
     float fx, fy;
     if (interpolation == Interpolation::CLOSEST) {
         const int ix = pixel_below(x, &fx), iy = pixel_below(y, &fy);
         const float one[1] = {1.0f};
-        return blend_texels<1>(image, ix, iy, one, one, extension);
+        return blend_texels<Stored, 1>(image, ix, iy, one, one, extension);
     }
     const int ix = pixel_below(x - 0.5f, &fx), iy = pixel_below(y - 0.5f, &fy);
     if (interpolation == Interpolation::LINEAR) {
         const float wx[2] = {1.0f - fx, fx}, wy[2] = {1.0f - fy, fy};
-        return blend_texels<2>(image, ix, iy, wx, wy, extension);
+        return blend_texels<Stored, 2>(image, ix, iy, wx, wy, extension);
     }
     float wx[4], wy[4];
     cubic_weights(fx, wx);
     cubic_weights(fy, wy);
-    return blend_texels<4>(image, ix - 1, iy - 1, wx, wy, extension);
+    return blend_texels<Stored, 4>(image, ix - 1, iy - 1, wx, wy, extension);
+}
+
+// The stored value at (u, v), 0..1 over the image, v upwards.
+LUCH_FN_SLOW Texel look_up_image(const ImageView& image, float u, float v, Interpolation interpolation,
+                                 Extension extension) {
+    const float x = u * float(image.width), y = v * float(image.height);
+    if (image.format == PixelFormat::U8) return interpolate_image<u8>(image, x, y, interpolation, extension);
+    if (image.format == PixelFormat::F16) return interpolate_image<u16>(image, x, y, interpolation, extension);
+    return interpolate_image<float>(image, x, y, interpolation, extension);
 }
 
 LUCH_FN float srgb_to_linear(float c) {

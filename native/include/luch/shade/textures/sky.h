@@ -26,6 +26,7 @@ LUCH_FN Vec3 sky_direction(const float* in) {
 struct SkyAtmosphere {
     static constexpr int COLUMNS = 512, ROWS = 256;  // of the full circle; the left half is stored
     float sun_bottom[3], sun_top[3];                 // XYZ radiance of the disc's lower and upper end
+    float sun_direction[3];                          // unit
     float sun_elevation, sun_rotation;               // radians
     float sun_diameter;                              // radians; negative: no disc
     float sun_strength;
@@ -48,8 +49,7 @@ struct OpSkyAtmosphere {
 
  private:
     LUCH_FN static Vec3 sun_disc(const SkyAtmosphere& sky, Vec3 d, float elevation) {
-        const float theta = sky.sun_elevation - 0.5f * PI, phi = sky.sun_rotation - 0.5f * PI;
-        const Vec3 sun{sin_f(theta) * cos_f(phi), sin_f(theta) * sin_f(phi), cos_f(theta)};
+        const Vec3 sun{sky.sun_direction[0], sky.sun_direction[1], sky.sun_direction[2]};
         const float angle = 2.0f * atan2_f(length(d - sun), length(d + sun));  // exact for small angles
         const float radius = 0.5f * sky.sun_diameter;
         if (!(angle < radius && elevation > sky.horizon)) return make_vec3(0.0f);
