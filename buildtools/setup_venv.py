@@ -30,8 +30,9 @@ def ensure_environment() -> None:
     if _version(str(VENV_PYTHON)) != WANTED:
         _make_venv()
     print("installing the pinned requirements into .venv (bpy is about 400 MB)", flush=True)
+    pip = [str(VENV_PYTHON), "-m", "pip", "install", "-qq", "--disable-pip-version-check"]
     require(
-        [str(VENV_PYTHON), "-m", "pip", "install", "-q", "--disable-pip-version-check", "-r", str(requirements)],
+        [*pip, "--no-deps", "-r", str(requirements)],  # every package is pinned: nothing is left to resolve
         "the requirements could not be installed; see pip's message above",
     )
     stamp.write_text(digest)
@@ -42,7 +43,9 @@ def _make_venv() -> None:
     if python is None:
         raise BuildFailure(HOW_TO_GET_IT)
     print(f"making .venv with {python}", flush=True)
-    if VENV.is_symlink() or VENV.exists():
+    if VENV.is_symlink():
+        VENV.unlink()
+    elif VENV.exists():
         shutil.rmtree(VENV)
     require(
         [python, "-m", "venv", str(VENV)], "the virtual environment could not be made; is the venv module installed?"

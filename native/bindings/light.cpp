@@ -52,10 +52,9 @@ cpu::LampInput lamp_input(const py::dict& d) {
     return in;
 }
 
-
 // One material per mesh, one mesh per instance row.
 class TestLights {
-  public:
+ public:
     TestLights(const py::list& lamps, const py::list& meshes, const py::list& instances, const py::dict& world,
                bool light_tree) {
         for (auto item : meshes) add_mesh(item.cast<py::dict>());
@@ -82,7 +81,8 @@ class TestLights {
         size_t count = static_cast<size_t>(p.shape(0));
         py::array_t<i32> kind(count);
         py::array_t<bool> delta(count), mis(count);
-        Floats direction({count, size_t{3}}), radiance({count, size_t{3}}), normal({count, size_t{3}}), uv({count, size_t{2}});
+        Floats direction({count, size_t{3}}), radiance({count, size_t{3}}), normal({count, size_t{3}}),
+            uv({count, size_t{2}});
         Floats distance(count), pdf(count);
         Words lamp(count), instance(count), prim(count);
         for (size_t i = 0; i < count; ++i) {
@@ -137,7 +137,8 @@ class TestLights {
     }
 
     // sun >= 0: asks for that sun instead of the closest lamp.
-    py::dict hit(const Floats& p, const Floats& n, bool transmits, const Floats& direction, u32 ray_kind, int sun) const {
+    py::dict hit(const Floats& p, const Floats& n, bool transmits, const Floats& direction, u32 ray_kind,
+                 int sun) const {
         size_t count = static_cast<size_t>(p.shape(0));
         Words lamp(count);
         Floats t(count), pdf(count), radiance({count, size_t{3}}), uv({count, size_t{2}}), normal({count, size_t{3}});
@@ -151,7 +152,8 @@ class TestLights {
             store(h.normal, &normal, i);
             uv.mutable_data()[2 * i] = h.u;
             uv.mutable_data()[2 * i + 1] = h.v;
-            pdf.mutable_data()[i] = h.lamp == NONE ? 0.0f : pdf_lamp(scene_, ray.origin, vec(n, i), transmits, h, ray.direction);
+            pdf.mutable_data()[i] =
+                h.lamp == NONE ? 0.0f : pdf_lamp(scene_, ray.origin, vec(n, i), transmits, h, ray.direction);
         }
         py::dict r;
         r["lamp"] = lamp;
@@ -173,7 +175,7 @@ class TestLights {
         return r;
     }
 
-  private:
+ private:
     static Vec3 vec(const Floats& a, size_t i) { return {a.data()[3 * i], a.data()[3 * i + 1], a.data()[3 * i + 2]}; }
     static void store(Vec3 v, Floats* a, size_t i) {
         float* to = a->mutable_data() + 3 * i;

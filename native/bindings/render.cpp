@@ -6,7 +6,7 @@ namespace luch::bindings {
 namespace {
 
 class PyRenderer {
-  public:
+ public:
     explicit PyRenderer(const py::object& scene) {
         ReadScene read = read_scene(scene);
         dropped_instances_ = read.dropped_instances;
@@ -26,7 +26,8 @@ class PyRenderer {
         const cpu::Film& film = renderer_->film();
         py::dict result;
         for (const cpu::Pass& pass : film.passes()) {
-            py::array_t<float> image({py::ssize_t(film.height()), py::ssize_t(film.width()), py::ssize_t(pass.channels)});
+            py::array_t<float> image(
+                {py::ssize_t(film.height()), py::ssize_t(film.width()), py::ssize_t(pass.channels)});
             float* data = image.mutable_data();
             {
                 py::gil_scoped_release release;
@@ -57,7 +58,7 @@ class PyRenderer {
         return d;
     }
 
-  private:
+ private:
     std::unique_ptr<cpu::Renderer> renderer_;
     u64 dropped_instances_ = 0;
 };

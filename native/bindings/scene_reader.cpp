@@ -202,10 +202,14 @@ struct Reader {
         view.channels = u8(pixels.shape(2));
         size_t size = size_t(pixels.dtype().itemsize());
         char kind = pixels.dtype().kind();
-        if (kind == 'u' && size == 1) view.format = PixelFormat::U8;
-        else if (kind == 'f' && size == 2) view.format = PixelFormat::F16;
-        else if (kind == 'f' && size == 4) view.format = PixelFormat::F32;
-        else throw std::invalid_argument("Image \"" + name + "\": pixels must be uint8, float16 or float32.");
+        if (kind == 'u' && size == 1)
+            view.format = PixelFormat::U8;
+        else if (kind == 'f' && size == 2)
+            view.format = PixelFormat::F16;
+        else if (kind == 'f' && size == 4)
+            view.format = PixelFormat::F32;
+        else
+            throw std::invalid_argument("Image \"" + name + "\": pixels must be uint8, float16 or float32.");
         view.srgb = py::cast<std::string>(image.attr("colorspace")) == "SRGB";
         std::string alpha = py::cast<std::string>(image.attr("alpha"));
         view.alpha = alpha == "PREMULTIPLIED" ? 1 : alpha == "CHANNEL_PACKED" ? 2 : alpha == "NONE" ? 3 : 0;
@@ -219,13 +223,13 @@ struct Reader {
         std::string kind = py::cast<std::string>(light.attr("kind"));
         std::string shape = py::cast<std::string>(light.attr("shape"));
         using Shape = cpu::LampShape;
-        in.shape = kind == "POINT" ? Shape::POINT
-                   : kind == "SPOT" ? Shape::SPOT
-                   : kind == "SUN"  ? Shape::SUN
-                   : shape == "SQUARE" ? Shape::SQUARE
+        in.shape = kind == "POINT"        ? Shape::POINT
+                   : kind == "SPOT"       ? Shape::SPOT
+                   : kind == "SUN"        ? Shape::SUN
+                   : shape == "SQUARE"    ? Shape::SQUARE
                    : shape == "RECTANGLE" ? Shape::RECTANGLE
-                   : shape == "DISK" ? Shape::DISK
-                                     : Shape::ELLIPSE;
+                   : shape == "DISK"      ? Shape::DISK
+                                          : Shape::ELLIPSE;
         auto matrix = py::cast<Array<double>>(light.attr("matrix"));
         for (int i = 0; i < 12; i++) {
             double value = matrix.data()[i];
@@ -371,9 +375,11 @@ struct Reader {
         input.samples = count("samples");
         input.threads = count("threads");
         std::string accelerator = py::cast<std::string>(settings.attr("accelerator"));
-        if (accelerator == "BRUTE_FORCE") input.accel_kind = cpu::AccelKind::BRUTE_FORCE;
+        if (accelerator == "BRUTE_FORCE")
+            input.accel_kind = cpu::AccelKind::BRUTE_FORCE;
         else if (accelerator != "AUTO" && accelerator != "BVH") {
-            throw std::invalid_argument("Accelerator \"" + accelerator + "\" is not known; take AUTO, BVH or BRUTE_FORCE.");
+            throw std::invalid_argument("Accelerator \"" + accelerator +
+                                        "\" is not known; take AUTO, BVH or BRUTE_FORCE.");
         }
     }
 };

@@ -76,7 +76,8 @@ bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, u32 sides, 
     b->emission_rad = HALF_PI;
     b->two_sided = sides == 3u;
     float strength = luminance(abs_v(estimate));
-    b->intensity = clamp_f((strength > 0.0f && finite_f(strength) ? strength : 1.0f) * 0.5f * double_area, 1e-30f, 1e30f);
+    b->intensity =
+        clamp_f((strength > 0.0f && finite_f(strength) ? strength : 1.0f) * 0.5f * double_area, 1e-30f, 1e30f);
     return finite_v(b->low) && finite_v(b->high);
 }
 

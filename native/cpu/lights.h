@@ -53,7 +53,7 @@ struct WorldInput {
 Vec3 world_map_direction(int width, int height, int x, int y);
 
 class LightStore {
-  public:
+ public:
     LightStore();
     ~LightStore();
     // scene: meshes, instances, materials and material_table must be filled; SceneView::lights is not read.
@@ -63,7 +63,7 @@ class LightStore {
                const std::vector<Color>& material_emission_estimate, bool use_light_tree, ThreadPool& pool);
     const LightsView& view() const { return view_; }
 
-  private:
+ private:
     struct Arrays;
     std::unique_ptr<Arrays> arrays_;
     LightsView view_{};

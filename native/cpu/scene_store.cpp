@@ -14,11 +14,16 @@ constexpr const char* TANGENT_ACTIVE = "tangent";
 
 size_t rows_of(Domain domain, const MeshInput& mesh) {
     switch (domain) {
-        case Domain::POINT: return mesh.vertex_count;
-        case Domain::CORNER: return mesh.triangle_count * 3;
-        case Domain::FACE: return mesh.triangle_count;
-        case Domain::MESH: return 1;
-        case Domain::NONE_: return 0;
+        case Domain::POINT:
+            return mesh.vertex_count;
+        case Domain::CORNER:
+            return mesh.triangle_count * 3;
+        case Domain::FACE:
+            return mesh.triangle_count;
+        case Domain::MESH:
+            return 1;
+        case Domain::NONE_:
+            return 0;
     }
     return 0;
 }
@@ -56,11 +61,11 @@ bool invert_affine(const double* m, double* inverse) {
     inverse[9] = (m[1] * m[8] - m[0] * m[9]) * s;
     inverse[10] = (m[0] * m[5] - m[1] * m[4]) * s;
     for (int row = 0; row < 3; row++) {
-        inverse[row * 4 + 3] =
-            -(inverse[row * 4] * m[3] + inverse[row * 4 + 1] * m[7] + inverse[row * 4 + 2] * m[11]);
+        inverse[row * 4 + 3] = -(inverse[row * 4] * m[3] + inverse[row * 4 + 1] * m[7] + inverse[row * 4 + 2] * m[11]);
     }
     for (int i = 0; i < 12; i++) {
-        if (!std::isfinite(inverse[i]) || !std::isfinite(float(inverse[i])) || !std::isfinite(float(m[i]))) return false;
+        if (!std::isfinite(inverse[i]) || !std::isfinite(float(inverse[i])) || !std::isfinite(float(m[i])))
+            return false;
     }
     return true;
 }
@@ -140,8 +145,8 @@ bool SceneStore::add_instance(const InstanceInput& input) {
     instance.material_count = u32(object.materials.size());
     instance.visibility = object.visibility;
     const double* m = input.matrix;
-    double determinant = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-                         m[2] * (m[4] * m[9] - m[5] * m[8]);
+    double determinant =
+        m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
     instance.flags = (object.holdout ? INSTANCE_HOLDOUT : 0u) | (object.shadow_catcher ? INSTANCE_SHADOW_CATCHER : 0u) |
                      (determinant < 0 ? INSTANCE_MIRRORED : 0u);
     instance.random = input.random;
@@ -222,8 +227,8 @@ std::vector<std::vector<u8>> SceneStore::transparency_flags() const {
 }
 
 size_t SceneStore::bytes() const {
-    size_t sum = (positions_.size() + normals_.size() + attribute_data_.size() + triangles_.size()) * 4 + material_slots_.size() * 2 +
-                 instances_.size() * sizeof(InstanceView);
+    size_t sum = (positions_.size() + normals_.size() + attribute_data_.size() + triangles_.size()) * 4 +
+                 material_slots_.size() * 2 + instances_.size() * sizeof(InstanceView);
     for (const std::vector<u8>& pixels : pixels_) sum += pixels.size();
     return sum;
 }

@@ -51,7 +51,7 @@ struct InstanceInput {
 };
 
 class SceneStore {
-   public:
+ public:
     SceneStore();
 
     // Throws std::invalid_argument, naming the mesh, for an index out of range or sizes that do not agree.
@@ -78,7 +78,7 @@ class SceneStore {
     size_t bytes() const;
     u32 attribute_id(const std::string& name);
 
-   private:
+ private:
     void resolve_attributes();
 
     struct NamedAttribute {

@@ -158,7 +158,8 @@ void Batch::write_features(PathState& path, const ClosureSet& set) {
     float write = sum > 0.0f ? smooth_step(0.0f, 0.5f, rough_sum / sum) : 0.0f;
     if (write > 0.0f) {
         const FilmLayout& layout = writer_.film.layout;
-        film_add(writer_, path.pixel, layout.denoising_normal, normal * (write * average(path.feature_throughput) / sum));
+        film_add(writer_, path.pixel, layout.denoising_normal,
+                 normal * (write * average(path.feature_throughput) / sum));
         film_add(writer_, path.pixel, layout.denoising_albedo, path.feature_throughput * rough_albedo * write);
     }
     float through = average(set.transparent);

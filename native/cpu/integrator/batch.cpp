@@ -28,7 +28,8 @@ Batch::Batch(const RenderScene& scene, const FilmView& film)
     blocked_.resize(BATCH_PATHS * 2);
     material_first_.resize(scene.view.material_count + 1);
     registers_.resize(scene.max_registers * SHADE_LANES + 16);
-    aligned_registers_ = reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(registers_.data()) + 63) & ~uintptr_t(63));
+    aligned_registers_ =
+        reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(registers_.data()) + 63) & ~uintptr_t(63));
     aovs_.resize(size_t(film.layout.aov_count) * 4 * SHADE_LANES);
 }
 
@@ -67,8 +68,8 @@ void Batch::generate(const PixelBlock& block) {
     for (int y = 0; y < block.height; y++) {
         for (int x = 0; x < block.width; x++) {
             u32 px = u32(block.x0 + x), py = u32(block.y0 + y);
-            film_count_samples(writer_, (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0),
-                               false, block.sample_count);
+            film_count_samples(writer_, (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0), false,
+                               block.sample_count);
             PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples);
             for (u32 s = 0; s < block.sample_count; s++) {
                 int k = ray_count_++;
@@ -82,7 +83,8 @@ void Batch::generate(const PixelBlock& block) {
                 path.throughput = path.feature_throughput = make_vec3(1.0f);
                 path.continuation = 1.0f;
                 path.min_pdf = 1e30f;
-                path.flags = u32(PATH_CAMERA) | PATH_NO_MIS | PATH_THROUGH_FILM | (wants_features() ? u32(PATH_FEATURES) : 0u);
+                path.flags =
+                    u32(PATH_CAMERA) | PATH_NO_MIS | PATH_THROUGH_FILM | (wants_features() ? u32(PATH_FEATURES) : 0u);
                 path.visibility = RAY_CAMERA;
                 path.dimension = DIMENSIONS_CAMERA;
                 path.pixel = (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0);

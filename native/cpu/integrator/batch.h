@@ -37,7 +37,7 @@ struct PixelBlock {
 };
 
 class Batch {
-  public:
+ public:
     Batch(const RenderScene& scene, const FilmView& film);
     ~Batch();
 
@@ -47,7 +47,7 @@ class Batch {
 
     BatchCounts counts() const;
 
-  private:
+ private:
     // batch.cpp: the wavefront
     void generate(const PixelBlock& block);
     void traverse();

@@ -110,8 +110,10 @@ void Batch::emission_of_samples(const u32* queue, const int* lanes, int count) {
         const Program* program = program_of(scratch_->samples[open[0]]);
         int chosen[SHADE_LANES], chosen_count = 0, left = 0;
         for (int i = 0; i < open_count; i++) {
-            if (program_of(scratch_->samples[open[i]]) == program) chosen[chosen_count++] = open[i];
-            else open[left++] = open[i];
+            if (program_of(scratch_->samples[open[i]]) == program)
+                chosen[chosen_count++] = open[i];
+            else
+                open[left++] = open[i];
         }
         open_count = left;
         ShadePoints& points = scratch_->light_points;
@@ -177,8 +179,7 @@ Color Batch::eval_lamp(const PathState& path, const LampHit& hit, const Ray& ray
     in.transparent_depth = path.transparent_bounce;
     in.path = 0, in.seed = 0;
     setup_free_lane(in, hit.normal, points, 0);
-    run_program(scene_.view, lamp.program, points, scratch_->light_sets, aligned_registers_, nullptr, 0,
-                Wanted::LIGHT);
+    run_program(scene_.view, lamp.program, points, scratch_->light_sets, aligned_registers_, nullptr, 0, Wanted::LIGHT);
     return scratch_->light_sets[0].emission;
 }
 
@@ -231,8 +232,8 @@ void Batch::sample_ao(const PathState& path, u32 path_index, int lane) {
     make_frame(n, &t, &b);
     Vec3 direction = to_world(sample_cosine_hemisphere(u), t, b, n);
     Vec3 ng = lane_face_normal(points, lane);
-    shadow_rays_[shadow_count_] = {offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, ng, direction), 0.0f, direction,
-                                   scene_.limits.ao_distance};
+    shadow_rays_[shadow_count_] = {offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, ng, direction),
+                                   0.0f, direction, scene_.limits.ao_distance};
     ShadowRay& shadow = shadows_[shadow_count_];
     shadow = ShadowRay{};
     shadow.contribution = path.throughput * (make_vec3(1.0f) - set.transparent);

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "cpu/integrator/batch.h"
 #include "cpu/film.h"
+#include "cpu/integrator/batch.h"
 #include "cpu/integrator/render_scene.h"
 #include "cpu/lights.h"
 #include "cpu/scene_store.h"
@@ -41,7 +41,7 @@ struct RenderStats {
 };
 
 class Renderer {
-  public:
+ public:
     Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input);
     ~Renderer();
 
@@ -56,7 +56,7 @@ class Renderer {
     RenderStats stats() const;
     const Film& film() const { return film_; }
 
-  private:
+ private:
     void find_constants();
     void build_lights();
     std::vector<float> world_map(int width, int height);

@@ -16,7 +16,8 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
     setup_chunk(queue, count, points);
     float* aovs = aovs_.empty() ? nullptr : aovs_.data();
     if (aovs) std::fill(aovs_.begin(), aovs_.end(), 0.0f);
-    run_program(scene_.view, material.program, points, sets, aligned_registers_, aovs, size_t(writer_.film.layout.aov_count) * 4);
+    run_program(scene_.view, material.program, points, sets, aligned_registers_, aovs,
+                size_t(writer_.film.layout.aov_count) * 4);
 
     int lit_count = 0;
     for (int lane = 0; lane < count; lane++) {
@@ -40,7 +41,8 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
         int lane = scratch_->lit_lanes[i];
         u32 k = queue[lane];
         PathState& path = paths_[ray_path_[k]];
-        if (writer_.film.layout.ambient_occlusion != NONE && (path.flags & PATH_CAMERA)) sample_ao(path, ray_path_[k], lane);
+        if (writer_.film.layout.ambient_occlusion != NONE && (path.flags & PATH_CAMERA))
+            sample_ao(path, ray_path_[k], lane);
         scatter(path, k, lane);
     }
 }
@@ -123,7 +125,8 @@ void Batch::pass_through(PathState& path, u32 k, int lane, Color weight) {
     path.throughput *= weight;
     path.travelled += hits_[k].t;
     count_transparent(path, scene_.limits);
-    Vec3 origin = offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, lane_face_normal(scratch_->points, lane), rays_[k].direction);
+    Vec3 origin = offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error,
+                                lane_face_normal(scratch_->points, lane), rays_[k].direction);
     push_ray(ray_path_[k], origin, rays_[k].direction);
 }
 
@@ -160,7 +163,8 @@ void Batch::scatter(PathState& path, u32 k, int lane) {
     bool see_through = s.transmitted && scene_.limits.film_transparent_glass && scene_.limits.film_transparent &&
                        s.roughness <= sqr(scene_.limits.film_transparent_roughness);
     count_bounce(path, scene_.limits, s, set_transmits(set), see_through);
-    push_ray(ray_path_[k], offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, ng, s.direction), s.direction);
+    push_ray(ray_path_[k], offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, ng, s.direction),
+             s.direction);
 }
 
 // The first bounce decides how its later light is shared among the light passes.

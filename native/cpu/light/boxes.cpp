@@ -28,7 +28,7 @@ Box box_of(const LampView& lamp, u32 index) {
 float middle(const Box& b, int axis) { return (b.low + b.high)[axis]; }
 
 class Builder {
-  public:
+ public:
     std::vector<LampBoxNode> nodes;
 
     u32 build(Box* begin, Box* end) {
@@ -68,7 +68,7 @@ class Builder {
         return index;
     }
 
-  private:
+ private:
     static void halve(Box* from, Box* at, Box* to) {
         Vec3 low = make_vec3(1e38f), high = make_vec3(-1e38f);
         for (Box* b = from; b < to; ++b) {

@@ -17,7 +17,8 @@ bool is_closed(const u32* triangles, u32 count) {
     back.reserve(static_cast<size_t>(count) * 3);
     for (u32 t = 0; t < count; ++t) {
         for (u32 i = 0; i < 3; ++i) {
-            u32 from = triangles[3 * static_cast<size_t>(t) + i], to = triangles[3 * static_cast<size_t>(t) + (i + 1) % 3];
+            u32 from = triangles[3 * static_cast<size_t>(t) + i],
+                to = triangles[3 * static_cast<size_t>(t) + (i + 1) % 3];
             if (from == to) return false;
             there.push_back(edge_key(from, to));
             back.push_back(edge_key(to, from));

@@ -102,9 +102,12 @@ LampView make_lamp(const LampInput& in) {
     bool placed = finite_v(lamp.position) && length(z) > 1e-30f && finite_v(z);
     lamp.direction = normalize_or(-z, {0.0f, 0.0f, -1.0f});
     lamp.tan_half_spread = INFINITE_DISTANCE;
-    if (in.shape == LampShape::POINT || in.shape == LampShape::SPOT) make_point(in, &lamp);
-    else if (in.shape == LampShape::SUN) make_sun(in, &lamp);
-    else make_area(in, &lamp);
+    if (in.shape == LampShape::POINT || in.shape == LampShape::SPOT)
+        make_point(in, &lamp);
+    else if (in.shape == LampShape::SUN)
+        make_sun(in, &lamp);
+    else
+        make_area(in, &lamp);
     if (in.shape >= LampShape::SQUARE) {
         placed = placed && !is_zero(column(in.matrix, 0)) && !is_zero(column(in.matrix, 1)) && finite_f(lamp.area);
         // A sheared matrix keeps its edges; the normal is that of the plane they span, on the side of -z.

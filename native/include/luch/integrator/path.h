@@ -94,8 +94,9 @@ LUCH_FN u32 next_visibility(LobeClass lobe_class, bool transmitted) {
 // transparent.
 LUCH_FN void count_bounce(PathState& path, const PathLimits& limits, const BsdfSample& s, bool transmits,
                           bool see_through) {
-    u32 flags = path.flags & ~(u32(PATH_CAMERA | PATH_DIFFUSE | PATH_GLOSSY | PATH_SINGULAR | PATH_REFLECT | PATH_TRANSMIT) |
-                              u32(PATH_NO_MIS | PATH_BEHIND_TRANSPARENT | PATH_MIS_TRANSMITS));
+    u32 flags =
+        path.flags & ~(u32(PATH_CAMERA | PATH_DIFFUSE | PATH_GLOSSY | PATH_SINGULAR | PATH_REFLECT | PATH_TRANSMIT) |
+                       u32(PATH_NO_MIS | PATH_BEHIND_TRANSPARENT | PATH_MIS_TRANSMITS));
     path.bounce++;
     bool last = path.bounce >= limits.bounces;
     if (s.transmitted) {

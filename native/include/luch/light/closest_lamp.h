@@ -70,8 +70,10 @@ LUCH_FN_SLOW LampHit closest_lamp(const SceneView& scene, const Ray& ray, u32 ra
             int lane = __builtin_ctz(mask);
             mask &= mask - 1u;
             u32 child = node.child[lane];
-            if (child & BOX_IS_LAMP) try_lamp(lights, child & ~BOX_IS_LAMP, ray, ray_kind, &hit);
-            else if (size < LAMP_BOX_STACK) stack[size++] = child;
+            if (child & BOX_IS_LAMP)
+                try_lamp(lights, child & ~BOX_IS_LAMP, ray, ray_kind, &hit);
+            else if (size < LAMP_BOX_STACK)
+                stack[size++] = child;
         }
     }
     if (hit.lamp != NONE) finish_lamp_hit(lights.lamps[hit.lamp], ray.origin, d, &hit);

@@ -321,11 +321,14 @@ LUCH_FN_SLOW LampSample sample_lamp(const LampView& lamp, Vec3 p, Vec3 n, bool t
 LUCH_FN_SLOW float lamp_pdf(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec3 direction, float distance) {
     if (lamp.delta) return 0.0f;
     switch (lamp.kind) {
-        case LampKind::SPHERE: return sphere_pdf(lamp, p, n, transmits, direction);
+        case LampKind::SPHERE:
+            return sphere_pdf(lamp, p, n, transmits, direction);
         case LampKind::DISK:
             return area_pdf_sa(distance, length(lamp.position - p), PI * lamp.radius * lamp.radius);
-        case LampKind::SUN: return 1.0f / (TWO_PI * lamp.one_minus_cos_half_angle);
-        default: return area_region_pdf(make_area_region(lamp, p), distance);
+        case LampKind::SUN:
+            return 1.0f / (TWO_PI * lamp.one_minus_cos_half_angle);
+        default:
+            return area_region_pdf(make_area_region(lamp, p), distance);
     }
 }
 

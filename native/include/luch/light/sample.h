@@ -45,7 +45,8 @@ LUCH_FN_SLOW void group_shares(const LightsView& lights, const LightQuery& q, Gr
     s->world = any_world ? 1.0f : 0.0f;
     if (groups <= 1u) return;
     if (lights.uniform) {
-        float scale = 1.0f / (static_cast<float>(lights.emitter_count) + static_cast<float>(lights.sun_count) + s->world);
+        float scale =
+            1.0f / (static_cast<float>(lights.emitter_count) + static_cast<float>(lights.sun_count) + s->world);
         s->local = static_cast<float>(lights.emitter_count) * scale;
         s->suns = static_cast<float>(lights.sun_count) * scale;
         s->world *= scale;
@@ -73,7 +74,8 @@ LUCH_FN_SLOW void group_shares(const LightsView& lights, const LightQuery& q, Gr
 
 // ---- choosing ------------------------------------------------------------------------------------
 
-LUCH_FN_SLOW EmitterChoice choose_local(const LightsView& lights, const LightQuery& q, GroupShares* s, float u, Vec2 other) {
+LUCH_FN_SLOW EmitterChoice choose_local(const LightsView& lights, const LightQuery& q, GroupShares* s, float u,
+                                        Vec2 other) {
     if (lights.emitter_count == 1u) return {0u, 1.0f};
     if (lights.uniform) {
         float count = static_cast<float>(lights.emitter_count);
@@ -233,7 +235,8 @@ LUCH_FN_SLOW float pdf_triangle(const SceneView& scene, Vec3 p, Vec3 n, bool tra
     return shares.local * local_probability(lights, q, emitter) * triangle_cone_pdf(triangle.cone, distance);
 }
 
-LUCH_FN_SLOW float pdf_lamp(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, const LampHit& hit, Vec3 direction) {
+LUCH_FN_SLOW float pdf_lamp(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, const LampHit& hit,
+                            Vec3 direction) {
     const LightsView& lights = *scene.lights;
     const LampView& lamp = lights.lamps[hit.lamp];
     if (!lamp.mis) return 0.0f;

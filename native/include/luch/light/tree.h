@@ -45,7 +45,8 @@ struct LightQuery {
 
 LUCH_FN LightQuery make_light_query(Vec3 p, Vec3 n, bool transmits) {
     bool volume = is_zero(n);
-    return {p, n, transmits, volume, transmits ? -1.0f : 1.0f, transmits || volume ? 1e30f : 0.0f, volume ? 1.0f : 0.0f};
+    return {
+        p, n, transmits, volume, transmits ? -1.0f : 1.0f, transmits || volume ? 1e30f : 0.0f, volume ? 1.0f : 0.0f};
 }
 
 // Irradiance that one child may give, roughly; 0 only if it gives none. Slack keeps rounding from cutting off light.

@@ -26,7 +26,8 @@ LUCH_FN_SLOW WorldTriangle make_world_triangle(const SceneView& scene, u32 insta
                                 transform_point(to_world, load_position(scene, mesh.first_vertex + index[2])) - p);
     u32 slot = scene.material_slots[mesh.first_triangle + prim];
     u32 last = at.material_count > 0u ? at.material_count - 1u : 0u;
-    const MaterialView& material = scene.materials[scene.material_table[at.first_material + (slot < last ? slot : last)]];
+    const MaterialView& material =
+        scene.materials[scene.material_table[at.first_material + (slot < last ? slot : last)]];
     // Mirrored instances swap the order of corners and with it what make_triangle_cone calls the front.
     bool front = (t.cone.height < 0.0f) != ((at.flags & INSTANCE_MIRRORED) != 0u);
     u32 sides = material.emission_sampling & scene.lights->instance_sides[instance];

@@ -34,7 +34,8 @@ LUCH_FN Vec3 world_smooth_normal(const SceneView& scene, const MeshView& mesh, c
         i0 = t[0], i1 = t[1], i2 = t[2];
     }
     Vec3 n = load_vec3(scene.normals, mesh.first_normal + i0) * (1.0f - u - v) +
-             load_vec3(scene.normals, mesh.first_normal + i1) * u + load_vec3(scene.normals, mesh.first_normal + i2) * v;
+             load_vec3(scene.normals, mesh.first_normal + i1) * u +
+             load_vec3(scene.normals, mesh.first_normal + i2) * v;
     return normalize_or(transform_direction_transposed(instance.to_object, n), face_normal);
 }
 
