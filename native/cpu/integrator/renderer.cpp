@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "cpu/shade/interpreter.h"
+#include "cpu/sky/world_sun.h"
 #include "luch/shade/surface_setup.h"
 
 namespace luch::cpu {
@@ -100,7 +101,8 @@ void Renderer::find_constants() {
     }
 }
 
-std::vector<float> Renderer::world_map(int width, int height) {
+// The world without the disc of its sun, which has samples of its own.
+std::vector<float> Renderer::world_map(int width, int height, const WorldSun& sun) {
     std::vector<float> map(size_t(width) * size_t(height) * 3);
     const SceneView& view = scene_.view;
     pool_.parallel_for(size_t(height), 4, [&](size_t begin, size_t end, unsigned) {
@@ -114,7 +116,7 @@ std::vector<float> Renderer::world_map(int width, int height) {
                 points->count = std::min(SHADE_LANES, width - x0);
                 for (int lane = 0; lane < points->count; lane++) {
                     LaneInputs in{};
-                    in.point = world_map_direction(width, height, x0 + lane, int(y));
+                    in.point = beside_sun(sun, world_map_direction(width, height, x0 + lane, int(y)));
                     in.to_viewer = -in.point;
                     in.instance = in.prim = NONE;
                     in.flags = PATH_EMISSION_ONLY | PATH_DIFFUSE;
@@ -131,6 +133,25 @@ std::vector<float> Renderer::world_map(int width, int height) {
     return map;
 }
 
+WorldSun Renderer::find_sun(WorldInput& world) {
+    WorldSun sun = find_world_sun(scene_.view);
+    if (!sun.present) return sun;
+    ShadePoints points{};
+    points.count = 1;
+    LaneInputs in{};
+    in.point = sun.direction;
+    in.to_viewer = -in.point;
+    in.instance = in.prim = NONE;
+    in.flags = PATH_EMISSION_ONLY | PATH_DIFFUSE;
+    setup_free_lane(in, -in.point, points, 0);
+    world.has_sun = true;
+    world.sun_direction = sun.direction;
+    world.sun_angle = sun.angle;
+    world.sun_radiance = evaluate_emission(scene_.view, scene_.view.world_program, points) * SUN_MEAN_OVER_CENTRE;
+    sun.present = max_component(world.sun_radiance) > 0.0f;  // else it is set: the map may keep what is left of it
+    return sun;
+}
+
 void Renderer::build_lights() {
     WorldInput world = input_.world;
     std::vector<float> map;
@@ -139,7 +160,8 @@ void Renderer::build_lights() {
     if (world.present && !world.constant && input_.world_map_width > 0) {
         world.map_width = input_.world_map_width;
         world.map_height = input_.world_map_width / 2;
-        map = world_map(world.map_width, world.map_height);
+        const WorldSun sun = find_sun(world);
+        map = world_map(world.map_width, world.map_height, sun);
         world.map_rgb = map.data();
     }
     lights_.build(scene_.view, input_.lamps, world, input_.material_emission_estimate, input_.light_tree, pool_);

@@ -10,6 +10,7 @@
 #include "cpu/integrator/render_scene.h"
 #include "cpu/lights.h"
 #include "cpu/scene_store.h"
+#include "cpu/sky/world_sun.h"
 #include "cpu/thread_pool.h"
 
 namespace luch::cpu {
@@ -59,7 +60,8 @@ class Renderer {
  private:
     void find_constants();
     void build_lights();
-    std::vector<float> world_map(int width, int height);
+    WorldSun find_sun(WorldInput& world);  // and tells the world of it
+    std::vector<float> world_map(int width, int height, const WorldSun& sun);
 
     RenderInput input_;
     std::unique_ptr<SceneStore> store_;
