@@ -41,7 +41,7 @@ void Batch::add_emission(const PathState& path, Color radiance, u32 own_pass, u3
     if (!writer_.film.layout.any_light_pass && !(path.flags & PATH_FEATURES)) return;
     if (lightgroup) film_add_lightgroup(writer_, path.pixel, lightgroup - 1, c);
     if (path.flags & PATH_FEATURES) {
-        film_add(writer_, path.pixel, writer_.film.layout.denoising_albedo, path.feature_throughput * radiance);
+        film_add(writer_, path.pixel, writer_.film.layout.denoising_albedo, path.feature_throughput * c);
     }
     if (!(path.flags & PATH_PASS_CHOSEN)) {
         film_add(writer_, path.pixel, own_pass, c);
@@ -74,13 +74,13 @@ void Batch::add_alpha_hole(const PathState& path, float transparent) {
     film_add_transparency(writer_, path.pixel, transparent);
 }
 
-void Batch::write_aovs(const PathState& path, const ClosureSet& set, const float* aovs) {
-    if (!(path.flags & PATH_THROUGH_FILM)) return;
-    float weight = average(path.throughput * (make_vec3(1.0f) - set.transparent));
+// Written whole at every surface up to the first that counts as opaque, as Blender does: an AOV is data.
+void Batch::write_aovs(const PathState& path, const float* aovs) {
+    if (!(path.flags & PATH_THROUGH_FILM) || (path.flags & PATH_DATA_DONE)) return;
     for (u32 i = 0; i < writer_.film.layout.aov_count; i++) {
         const float* value = aovs + size_t(i) * 4;
         // A value AOV writes its one float; what lies beside it is never read.
-        film_add_aov_color(writer_, path.pixel, i, Color{value[0], value[1], value[2]} * weight, weight);
+        film_add_aov_color(writer_, path.pixel, i, Color{value[0], value[1], value[2]}, 1.0f);
     }
 }
 
@@ -138,14 +138,19 @@ float Batch::camera_depth(Vec3 p) const {
 
 float Batch::camera_distance(Vec3 p) const { return length(transform_point(scene_.camera.to_camera, p)); }
 
-// Albedo and normal for a denoiser; sharp reflections pass the task on to what they show.
-void Batch::write_features(PathState& path, const ClosureSet& set) {
+// Albedo and normal (in camera space) for a denoiser; transparency and sharp reflections pass the task on
+// to what they show.
+void Batch::write_features(PathState& path, const ClosureSet& set, Vec3 to_viewer) {
     Vec3 normal = make_vec3(0.0f);
     Color rough_albedo = make_vec3(0.0f), sharp_albedo = make_vec3(0.0f);
     float sum = 0.0f, rough_sum = 0.0f;
     for (int i = 0; i < set.count; i++) {
         const Lobe& lobe = set.lobes[i];
         Color albedo = lobe.weight;
+        if (!is_diffuse(lobe.type)) {
+            FresnelTerm share = lobe_albedo(lobe, to_viewer);
+            albedo *= share.reflected + share.transmitted;
+        }
         float weight = average(albedo);
         float roughness = is_diffuse(lobe.type) ? 1.0f : sqrt_f(lobe.alpha_x * lobe.alpha_y);
         float rough = smooth_step(0.0f, 0.15f, roughness);
@@ -158,18 +163,14 @@ void Batch::write_features(PathState& path, const ClosureSet& set) {
     float write = sum > 0.0f ? smooth_step(0.0f, 0.5f, rough_sum / sum) : 0.0f;
     if (write > 0.0f) {
         const FilmLayout& layout = writer_.film.layout;
+        // The mean normal, by the share of the surface that is not transparent.
+        float weight = write * average(path.feature_throughput) / (sum + average(set.transparent));
         film_add(writer_, path.pixel, layout.denoising_normal,
-                 normal * (write * average(path.feature_throughput) / sum));
+                 transform_direction(scene_.camera.to_camera, normal) * weight);
         film_add(writer_, path.pixel, layout.denoising_albedo, path.feature_throughput * rough_albedo * write);
     }
-    float through = average(set.transparent);
-    if (!(through + sum > 0.0f)) {
-        path.flags &= ~u32(PATH_FEATURES);
-        return;
-    }
-    // What is left goes on with the path: through transparency whole, through sharp lobes by their colour.
-    path.feature_throughput *= (sharp_albedo * (1.0f - write) + make_vec3(through)) * (1.0f / (sum + through));
-    if (max_component(path.feature_throughput) < 1e-3f) path.flags &= ~u32(PATH_FEATURES);
+    path.feature_throughput *= sharp_albedo * (1.0f - write) + set.transparent;
+    if (!(max_component(path.feature_throughput) > 1e-4f)) path.flags &= ~u32(PATH_FEATURES);
 }
 
 }  // namespace luch::cpu

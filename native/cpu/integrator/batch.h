@@ -92,11 +92,11 @@ class Batch {
     void add_environment_only(const PathState& path, Color radiance);
     void add_direct(const PathState& path, const ShadowRay& shadow, Color transmittance);
     void add_alpha_hole(const PathState& path, float transparent);
-    void write_aovs(const PathState& path, const ClosureSet& set, const float* aovs);
+    void write_aovs(const PathState& path, const float* aovs);
     void write_data_passes(PathState& path, const ShadePoints& points, int lane, const ClosureSet& set, u32 material);
     void write_first_sample(u32 pixel, Vec3 p, u32 instance, u32 material);
     void write_crypto(const PathState& path, u32 instance, u32 material, float alpha);
-    void write_features(PathState& path, const ClosureSet& set);
+    void write_features(PathState& path, const ClosureSet& set, Vec3 to_viewer);
     float camera_depth(Vec3 p) const;
     float camera_distance(Vec3 p) const;
 

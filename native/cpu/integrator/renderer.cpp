@@ -164,6 +164,9 @@ void Renderer::build_lights() {
         map = world_map(world.map_width, world.map_height, sun);
         world.map_rgb = map.data();
     }
+    // A world without a map is left to the paths that leave the scene: they follow the surface's own
+    // distribution, which no choice among lights improves on where all directions are equally bright.
+    if (world.map_rgb == nullptr) world.present = false;
     lights_.build(scene_.view, input_.lamps, world, input_.material_emission_estimate, input_.light_tree, pool_);
     store_->view().lights = scene_.view.lights = &lights_.view();
     const LightsView& lights = lights_.view();

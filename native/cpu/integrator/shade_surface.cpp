@@ -29,9 +29,9 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
         if (!is_zero(set.emission)) add_surface_emission(path, hits_[k], points, lane, set.emission);
         if (path.flags & PATH_ENDS_AT_SURFACE) continue;
         if (path.continuation != 1.0f) path.throughput *= 1.0f / path.continuation;
-        if (aovs) write_aovs(path, set, aovs + size_t(lane) * size_t(writer_.film.layout.aov_count) * 4);
+        if (aovs) write_aovs(path, aovs + size_t(lane) * size_t(writer_.film.layout.aov_count) * 4);
         if (writer_.film.layout.any_data_pass) write_data_passes(path, points, lane, set, material_index);
-        if (path.flags & PATH_FEATURES) write_features(path, set);
+        if (path.flags & PATH_FEATURES) write_features(path, set, lane_to_viewer(points, lane));
         if (path.flags & PATH_LAST_BOUNCE) set.count = 0;  // only straight-through light goes on
         scratch_->lit_lanes[lit_count++] = lane;
     }
