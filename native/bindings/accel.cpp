@@ -27,7 +27,8 @@ class ArrayAccel {
     // to_object: (I, 12). visibility: (I,) RayKind bits. flags: one per triangle, or none.
     ArrayAccel(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags,
                const IndexArray& meshes, const IndexArray& instance_meshes, const FloatArray& to_world,
-               const FloatArray& to_object, const IndexArray& visibility, bool brute_force, unsigned threads)
+               const FloatArray& to_object, const IndexArray& visibility, bool brute_force, unsigned threads,
+               u64 flatten_triangles)
         : pool_(threads) {
         std::vector<MeshView> mesh_views(size_t(meshes.shape(0)), MeshView{});
         std::vector<std::vector<u8>> mesh_flags;
@@ -54,8 +55,8 @@ class ArrayAccel {
         scene.instances = instances.data();
         scene.instance_count = u32(instances.size());
         py::gil_scoped_release release;
-        accel_ =
-            Accel::build(scene, mesh_flags, pool_, brute_force ? cpu::AccelKind::BRUTE_FORCE : cpu::AccelKind::BVH);
+        auto kind = brute_force ? cpu::AccelKind::BRUTE_FORCE : cpu::AccelKind::BVH;
+        accel_ = Accel::build(scene, mesh_flags, pool_, kind, flatten_triangles);
     }
 
     // kinds: one RayKind mask per ray, or none.
@@ -135,7 +136,7 @@ FloatArray spawn_rays(const FloatArray& corners, const FloatArray& uv, const Flo
 void bind_accel(py::module_& m) {
     py::class_<ArrayAccel>(m, "ArrayAccel")
         .def(py::init<const FloatArray&, const IndexArray&, const ByteArray&, const IndexArray&, const IndexArray&,
-                      const FloatArray&, const FloatArray&, const IndexArray&, bool, unsigned>())
+                      const FloatArray&, const FloatArray&, const IndexArray&, bool, unsigned, u64>())
         .def("closest", &ArrayAccel::closest)
         .def("any", &ArrayAccel::any)
         .def("stats", &ArrayAccel::stats);

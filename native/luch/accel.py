@@ -51,7 +51,7 @@ class Accel:
         here = np.eye(3, 4, dtype=np.float32).reshape(1, 12)
         self._core = core.ArrayAccel(
             points, corners, flags, mesh, np.zeros(1, np.uint32), here, here, np.full(1, 63, np.uint32),
-            kind == "BRUTE_FORCE", threads)  # fmt: skip
+            kind == "BRUTE_FORCE", threads, 0)  # fmt: skip
 
     def closest(self, rays: npt.ArrayLike) -> tuple[Float32s, Int32s, Float32s, Float32s]:
         """Closest hit of each ray. rays: (N, 8) float32.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,7 +25,7 @@ class Scene:
     meshes: list[Mesh]
     instances: list[tuple[int, NDArray[Any], int]] = field(default_factory=list)
 
-    def build(self, brute_force: bool = False) -> Any:
+    def build(self, brute_force: bool = False, flatten: int = 0) -> Any:
         table, vertex, triangle = [], 0, 0
         for points, triangles in self.meshes:
             table.append([vertex, len(points), triangle, len(triangles)])
@@ -35,7 +36,7 @@ class Scene:
             np.concatenate([p for p, _ in self.meshes]), np.concatenate([t for _, t in self.meshes]),
             np.zeros(0, np.uint8), np.array(table, np.uint32), np.array([m for m, _, _ in self.instances], np.uint32),
             world, np.array(inverse, np.float32).reshape(-1, 12),
-            np.array([v for _, _, v in self.instances], np.uint32), brute_force, 1)  # fmt: skip
+            np.array([v for _, _, v in self.instances], np.uint32), brute_force, 1, flatten)  # fmt: skip
 
 
 def _inverse(matrix: NDArray[Any]) -> NDArray[Any]:
@@ -60,24 +61,27 @@ def crowd(count: int, spread: float = 5.0, seed: int = 4) -> Scene:
     return scene
 
 
+@pytest.mark.parametrize("flatten", [0, 40_000, 10_000_000])
 @pytest.mark.parametrize("count", [1, 2, 9, 60])
-def test_instances_hit_bit_equal_to_brute_force(count: int) -> None:
+def test_instances_hit_bit_equal_to_brute_force(count: int, flatten: int) -> None:
     scene = crowd(count)
     rays = random_rays(400, scale=3.0)
-    ours, truth = scene.build().closest(rays, NO_KINDS), scene.build(True).closest(rays, NO_KINDS)
+    accel = scene.build(flatten=flatten)
+    ours, truth = accel.closest(rays, NO_KINDS), scene.build(True, flatten).closest(rays, NO_KINDS)
     assert (truth[1] >= 0).any()
     for a, b in zip(ours, truth, strict=True):
         assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
-    assert np.array_equal(scene.build().any(rays, NO_KINDS) != 0, truth[1] >= 0)
+    assert np.array_equal(accel.any(rays, NO_KINDS) != 0, truth[1] >= 0)
 
 
+@pytest.mark.parametrize("flatten", [0, 10_000_000])
 @pytest.mark.parametrize("distance", [0.0, 1e4, 1e6])
-def test_instances_hit_where_their_triangles_are_in_the_world(distance: float) -> None:
+def test_instances_hit_where_their_triangles_are_in_the_world(distance: float, flatten: int) -> None:
     scene = crowd(30)
     for _, matrix, _ in scene.instances:
         matrix[:, 3] += distance
     rays = random_rays(4000, center=distance, scale=3.0)
-    t, prim, u, v, instance = scene.build().closest(rays, NO_KINDS)
+    t, prim, u, v, instance = scene.build(flatten=flatten).closest(rays, NO_KINDS)
     hit = prim >= 0
     assert hit.sum() > 100
     along = rays[hit, :3].astype(float) + t[hit, None] * rays[hit, 4:7].astype(float)
@@ -108,13 +112,13 @@ def test_closed_instances_let_no_ray_out() -> None:
 
 def test_visibility_hides_instances_from_kinds_of_rays() -> None:
     here = np.eye(3, 4)
-    for meshes in ([icosphere(4)] * 3, [icosphere(2)] * 3):  # instanced, and taken to the world
-        scene = Scene(meshes)
+    for flatten in (0, 10_000_000):
+        scene = Scene([icosphere(2)] * 3)
         for m, (scale, mask) in enumerate(((1.0, ALL & ~CAMERA), (2.0, ALL), (3.0, 0))):
             scene.instances += [(m, here * scale, mask), (m, here * scale * 1.1, mask)]
         ray = rows(np.array([[9.0, 0.1, 0.2]]), np.array([[-1.0, 0, 0]]))
         for brute_force in (False, True):
-            accel = scene.build(brute_force)
+            accel = scene.build(brute_force, flatten)
             start = rows(np.zeros((1, 3)), np.array([[1.0, 0.1, 0.2]]))
             seen = [int(accel.closest(start, np.array([kind], np.uint32))[4][0]) for kind in (CAMERA, SHADOW, ALL)]
             assert seen == [2, 0, 0]
@@ -125,14 +129,15 @@ def test_equal_hits_of_instances_go_to_the_smaller_instance() -> None:
     wall = separate(np.array([[(-9, -9, 2), (9, -9, 2), (0, 9, 2)]]))
     big = (np.tile(wall[0], (3000, 1)), np.tile(wall[1], (3000, 1)))
     scene = Scene([big, wall], [(0, np.eye(3, 4), ALL), (1, np.eye(3, 4), ALL), (0, np.eye(3, 4), ALL)])
-    for order in ((0, 1, 2), (1, 0, 2), (2, 1, 0)):
+    for order, flatten in itertools.product(((0, 1, 2), (1, 0, 2), (2, 1, 0)), (0, 10_000_000)):
         shuffled = Scene(scene.meshes, [scene.instances[i] for i in order])
-        hit = shuffled.build().closest(rows(np.zeros((1, 3)), np.array([[0, 0, 1.0]])), NO_KINDS)
+        hit = shuffled.build(flatten=flatten).closest(rows(np.zeros((1, 3)), np.array([[0, 0, 1.0]])), NO_KINDS)
         assert (hit[4][0], hit[1][0]) == (0, 0)
 
 
+@pytest.mark.parametrize("flatten", [0, 10_000_000])
 @pytest.mark.parametrize("scale", [0.0, 1e-20, np.inf, np.nan])
-def test_broken_transforms_harm_nothing_else(scale: float) -> None:
+def test_broken_transforms_harm_nothing_else(scale: float, flatten: int) -> None:
     rng = np.random.default_rng(1)
     with np.errstate(invalid="ignore"):
         broken = np.eye(3, 4) * scale
@@ -140,7 +145,8 @@ def test_broken_transforms_harm_nothing_else(scale: float) -> None:
     scene.instances = [(0, np.eye(3, 4), ALL), (0, broken, ALL), (1, broken, ALL), (0, placed(rng, 9.0), ALL)]
     alone = Scene(scene.meshes, [scene.instances[0], scene.instances[3]])
     rays = random_rays(2000, scale=3.0)
-    for a, b in zip(scene.build().closest(rays, NO_KINDS)[:4], alone.build().closest(rays, NO_KINDS)[:4], strict=True):
+    ours, truth = (s.build(flatten=flatten).closest(rays, NO_KINDS) for s in (scene, alone))
+    for a, b in zip(ours[:4], truth[:4], strict=True):
         assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
 
 

@@ -17,9 +17,6 @@ namespace {
 constexpr float LARGEST = 3.402823466e+38f;
 constexpr Hit MISS = {INFINITE_DISTANCE, NONE, NONE, 0.0f, 0.0f};
 constexpr u32 BATCH = 1024;  // rays looked at together
-// A mesh with one user, or so small that its copies weigh little, is taken to the world: no transform per
-// ray, no overlapping boxes. One tree holds all such instances of equal visibility.
-constexpr u64 FLATTEN_TRIANGLES = 4096;
 // Groups below this size are built side by side, one thread each.
 constexpr u32 SMALL_GROUP_REFS = 65536;
 
@@ -61,15 +58,34 @@ Box world_box(const Affine& to_world, const Box& box) {
 }
 float size_of(const Box& box) { return max_f(max_component(abs_v(box.lo)), max_component(abs_v(box.hi))); }
 
+// Which meshes' instances are all taken to the world: those with one user, then those of fewest copies while
+// the budget lasts.
+std::vector<u8> meshes_to_flatten(const SceneView& scene, u64 budget) {
+    std::vector<u64> users(scene.mesh_count);
+    for (u32 i = 0; i < scene.instance_count; ++i) ++users[scene.instances[i].mesh];
+    std::vector<u32> order(scene.mesh_count);
+    for (u32 m = 0; m < scene.mesh_count; ++m) order[m] = m;
+    auto copies = [&](u32 m) { return users[m] * scene.meshes[m].triangle_count; };
+    std::stable_sort(order.begin(), order.end(), [&](u32 a, u32 b) { return copies(a) < copies(b); });
+    std::vector<u8> flatten(scene.mesh_count);
+    u64 taken = 0;
+    for (u32 m : order) {
+        flatten[m] = users[m] == 1 || taken + copies(m) <= budget;
+        if (flatten[m] && users[m] > 1) taken += copies(m);
+    }
+    return flatten;
+}
+
 class TwoLevel final : public Accel {
  public:
-    TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool, AccelKind kind);
+    TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool, AccelKind kind,
+             u64 flatten_triangles);
     void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const override;
     void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const override;
     AccelStats stats() const override { return stats_; }
 
  private:
-    void plan(const SceneView& scene);
+    void plan(const SceneView& scene, u64 flatten_triangles);
     void add_entry(const SceneView& scene, u32 instance, u32 group);
     void build_groups(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
                       bool with_tree);
@@ -92,30 +108,30 @@ class TwoLevel final : public Accel {
     AccelStats stats_;
 };
 
-TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
-                   AccelKind kind) {
+TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool, AccelKind kind,
+                   u64 flatten_triangles) {
     auto start = std::chrono::steady_clock::now();
     if (!flags.empty() && flags.size() != scene.mesh_count)
         throw std::invalid_argument("triangle_flags lists " + std::to_string(flags.size()) + " meshes, the scene has " +
                                     std::to_string(scene.mesh_count) + ".");
-    plan(scene);
+    plan(scene, flatten_triangles);
     build_groups(scene, flags, pool, kind == AccelKind::BVH);
     if (kind == AccelKind::BVH && entries_.size() > 1) build_top(scene, pool);
     count();
     stats_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Decides which instances are taken to the world, and lists groups and entries.
-void TwoLevel::plan(const SceneView& scene) {
-    std::vector<u32> users(scene.mesh_count), group_of_mesh(scene.mesh_count, NONE);
-    for (u32 i = 0; i < scene.instance_count; ++i) ++users[scene.instances[i].mesh];
+// Lists groups and entries.
+void TwoLevel::plan(const SceneView& scene, u64 flatten_triangles) {
+    std::vector<u8> flatten = meshes_to_flatten(scene, flatten_triangles);
+    std::vector<u32> group_of_mesh(scene.mesh_count, NONE);
     std::vector<std::pair<u32, u32>> flat;  // visibility, group
     std::vector<u64> flat_refs;             // of each such group
     for (u32 i = 0; i < scene.instance_count; ++i) {
         const InstanceView& instance = scene.instances[i];
         u32 triangles = scene.meshes[instance.mesh].triangle_count;
         if (instance.visibility == 0 || triangles == 0) continue;
-        if (users[instance.mesh] > 1 && u64(users[instance.mesh]) * triangles > FLATTEN_TRIANGLES) {
+        if (!flatten[instance.mesh]) {
             u32& group = group_of_mesh[instance.mesh];
             if (group == NONE) {
                 group = u32(groups_.size());
@@ -318,8 +334,8 @@ void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t co
 }  // namespace
 
 std::unique_ptr<Accel> Accel::build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
-                                    ThreadPool& pool, AccelKind kind) {
-    return std::make_unique<TwoLevel>(scene, triangle_flags, pool, kind);
+                                    ThreadPool& pool, AccelKind kind, u64 flatten_triangles) {
+    return std::make_unique<TwoLevel>(scene, triangle_flags, pool, kind, flatten_triangles);
 }
 
 }  // namespace luch::cpu
