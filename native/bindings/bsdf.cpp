@@ -139,6 +139,16 @@ const std::map<std::string, Setup>& setups() {
              auto s = read_simple(in);
              setup_diffuse(set, w, s.color, s.roughness, s.normal, c);
          }},
+        {"toon",
+         [](Set set, Color w, Inputs& in, Context c) {
+             float size = 0.5f, smooth = 0.0f;
+             bool glossy = false;
+             in.read("size", size);
+             in.read("smooth", smooth);
+             in.read("glossy", glossy);
+             auto s = read_simple(in);
+             setup_toon(set, w, s.color, size, smooth, glossy, s.normal, c);
+         }},
         {"translucent",
          [](Set set, Color w, Inputs& in, Context c) {
              auto s = read_simple(in);

@@ -77,6 +77,8 @@ MATERIALS: dict[str, Material] = {
     "refraction": ("Refraction", {"distribution": "GGX"}, {"Color": BLUE, "Roughness": 0.4, "IOR": 0.8}),
     "sheen": ("Sheen", {"distribution": "MICROFIBER"}, {"Color": ROSE, "Roughness": 0.4}),
     "velvet": ("Sheen", {"distribution": "ASHIKHMIN"}, {"Color": ROSE, "Roughness": 0.6}),
+    "toon diffuse": ("Toon", {"component": "DIFFUSE"}, {"Color": ROSE, "Size": 0.4, "Smooth": 0.3}),
+    "toon glossy": ("Toon", {"component": "GLOSSY"}, {"Color": ROSE, "Size": 0.2, "Smooth": 0.1}),
     "principled": ("Principled", {}, {"Base Color": BLUE}),
     "principled ggx": ("Principled", {"distribution": "GGX"}, {"Base Color": BLUE, "Roughness": 0.9}),
     "principled metal": (
@@ -159,6 +161,8 @@ def our_closures(material: Material, wo: tuple[float, float, float], behind: boo
         for tint in ("specular_tint", "coat_tint", "sheen_tint", "emission_color"):
             ours.setdefault(tint, (1.0, 1.0, 1.0))
     else:
+        if node == "Toon":
+            ours["glossy"] = menus["component"] == "GLOSSY"
         if "distribution" in menus:
             ours["distribution"] = menus["distribution"]
         if node == "Metallic":

@@ -44,6 +44,8 @@ LOBES: dict[str, tuple[str, dict[str, Any], int]] = {
     "refraction": ("refraction", {"roughness": 0.6, "distribution": "GGX"}, CAMERA),
     "sheen": ("sheen", {"roughness": 0.5}, CAMERA),
     "velvet": ("velvet", {"roughness": 0.5}, CAMERA),
+    "toon": ("toon", {"size": 0.4, "smooth": 2 / 3 - 0.4}, CAMERA),  # its rim lies on a bin edge
+    "toon glossy": ("toon", {"size": 0.3, "smooth": 0.2, "glossy": True}, CAMERA),
     "conductor": ("metallic", {"physical": True}, CAMERA),
     "principled": ("principled", {"coat_weight": 0.5, "coat_roughness": 0.4, "sheen_weight": 0.5}, CAMERA),
     "thin glass": ("principled", {"thin_wall": True, "transmission_weight": 1.0}, CAMERA),

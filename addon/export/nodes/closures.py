@@ -85,6 +85,13 @@ def sheen(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     c.builder.closure("CLOSURE_SHEEN", weight, inputs, _params(c, int(node.distribution == "ASHIKHMIN")))
 
 
+@closure_emitter("ShaderNodeBsdfToon")
+def toon(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Toon: diffuse or glossy."""
+    inputs = (*c.color(node, "Color"), c.float(node, "Size"), c.float(node, "Smooth"), *_normal(c, node))
+    c.builder.closure("CLOSURE_TOON", weight, inputs, _params(c, int(node.component == "GLOSSY")))
+
+
 @closure_emitter("ShaderNodeBsdfAnisotropic")
 def glossy(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Glossy."""
@@ -183,9 +190,9 @@ def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     c.builder.closure("CLOSURE_DIFFUSE", weight, inputs, _params(c))
 
 
-@closure_emitter("ShaderNodeBsdfToon", "ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled")
+@closure_emitter("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled")
 def as_diffuse(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
-    """Toon and hair: diffuse of the same colour."""
+    """Hair: diffuse of the same colour."""
     c.warn(node, "is not supported yet; it is shown as diffuse of its colour")
     zero = c.builder.constant(0.0)
     c.builder.closure("CLOSURE_DIFFUSE", weight, (*c.color(node, "Color"), zero, zero, zero, zero), _params(c))

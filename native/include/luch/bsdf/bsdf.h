@@ -5,6 +5,7 @@
 #include "luch/bsdf/diffuse.h"
 #include "luch/bsdf/microfacet.h"
 #include "luch/bsdf/sheen.h"
+#include "luch/bsdf/toon.h"
 
 namespace luch {
 
@@ -18,6 +19,7 @@ LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
         case LobeType::DIFFUSE:
         case LobeType::OREN_NAYAR:
         case LobeType::TRANSLUCENT:
+        case LobeType::TOON_DIFFUSE:
         case LobeType::SHEEN:
             return CLASS_DIFFUSE;
         case LobeType::MICROFACET_REFRACTION:
@@ -46,6 +48,9 @@ LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
             return eval_sheen(lobe, wi);
         case LobeType::ASHIKHMIN_SHEEN:
             return eval_velvet(lobe, wo, wi);
+        case LobeType::TOON_DIFFUSE:
+        case LobeType::TOON_GLOSSY:
+            return eval_toon(lobe, wo, wi);
         case LobeType::ASHIKHMIN_SHIRLEY:
             return eval_ashikhmin_shirley(lobe, wo, wi);
         case LobeType::MICROFACET_REFLECTION:
@@ -88,6 +93,8 @@ LUCH_FN LobeSample sample_fibres_or_diffuse(const Lobe& lobe, Vec3 n_outside, Ve
         s.direction = sample_sheen(lobe, u);
     } else if (lobe.type == LobeType::ASHIKHMIN_SHEEN) {
         s.direction = sample_uniform_around(lobe.normal, u);
+    } else if (lobe.type == LobeType::TOON_DIFFUSE || lobe.type == LobeType::TOON_GLOSSY) {
+        s.direction = sample_toon(lobe, wo, u);
     } else {
         s.direction = sample_cosine_around(s.transmitted ? -lobe.normal : lobe.normal, u);
     }

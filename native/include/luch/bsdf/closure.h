@@ -12,13 +12,15 @@ enum class LobeType : u8 {
     DIFFUSE,         // Lambert
     OREN_NAYAR,
     TRANSLUCENT,
-    SHEEN,           // microfibre, LTC
+    TOON_DIFFUSE,
+    SHEEN,           // microfibre, LTC; the last that counts as diffuse
     ASHIKHMIN_SHEEN, // legacy velvet
+    TOON_GLOSSY,
     MICROFACET_REFLECTION,    // GGX / Beckmann; fresnel says which
     MICROFACET_REFRACTION,
     MICROFACET_GLASS,         // reflection and refraction in one lobe
     ASHIKHMIN_SHIRLEY,
-    // hair, toon, subsurface, ray portal: later, each one line here and one header
+    // hair, subsurface, ray portal: later, each one line here and one header
 };
 
 // What a lobe counts as for passes, bounces and ray visibility.

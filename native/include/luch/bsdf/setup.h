@@ -8,6 +8,7 @@
 #include "luch/bsdf/principled.h"
 #include "luch/bsdf/setup_specular.h"
 #include "luch/bsdf/sheen.h"
+#include "luch/bsdf/toon.h"
 
 namespace luch {
 
@@ -16,6 +17,16 @@ LUCH_FN void setup_diffuse(ClosureSet& set, Color weight, Color color, float rou
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::DIFFUSE, weight * color, closure_normal(normal, c), c)) return;
     if (roughness >= OREN_NAYAR_MIN_ROUGHNESS) prepare_oren_nayar(lobe, color, dot(lobe.normal, c.wo), roughness);
+    add_lobe(set, lobe, c);
+}
+
+LUCH_FN void setup_toon(ClosureSet& set, Color weight, Color color, float size, float smooth, bool glossy, Vec3 normal,
+                        const SetupContext& c) {
+    if (glossy && !allows_reflective_caustics(c)) return;
+    Lobe lobe;
+    LobeType type = glossy ? LobeType::TOON_GLOSSY : LobeType::TOON_DIFFUSE;
+    if (!start_lobe(lobe, type, weight * color, closure_normal(normal, c), c)) return;
+    prepare_toon(lobe, size, smooth);
     add_lobe(set, lobe, c);
 }
 

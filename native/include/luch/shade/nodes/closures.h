@@ -91,6 +91,13 @@ LUCH_LOBE_OP(OpClosureSheen, 7, 2, {  // colour, roughness, normal; params[1]: A
     }
 });
 
+LUCH_LOBE_OP(OpClosureToon, 8, 2, {  // colour, size, smooth, normal; params[1]: glossy
+    Color color = read.vec3();
+    float size = read.number();
+    float smooth = read.number();
+    setup_toon(set, weight, color, size, smooth, params[1] != 0, read.vec3(), context);
+});
+
 LUCH_LOBE_OP(OpClosureGlossy, 12, 2, {  // params[1]: Microfacets, here and below
     GlossyParams p;
     p.color = read.vec3();
