@@ -140,7 +140,7 @@ class InstanceCollector:
                 holdout=holdout,
                 shadow_catcher=subject.is_shadow_catcher,
                 lightgroup=subject.lightgroup or parent.lightgroup,
-                asset=asset_name(parent),
+                asset=asset_name(subject),
             )
         )
         self._warn_about_what_is_missing(subject)
@@ -180,6 +180,7 @@ class InstanceCollector:
         self._warn_about_what_is_missing(subject)
         light = export_light(subject, rows.astype(np.float64), random, visibility, self._context)
         if np.isfinite([light.power, *light.color]).all():
+            light.lightgroup = subject.lightgroup or parent.lightgroup
             self._context.result.lights.append(light)
         else:
             self._context.warn(f'Light "{subject.name}": its power is not finite, so it is left out.')

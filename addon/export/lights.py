@@ -28,7 +28,6 @@ def export_light(subject: Any, matrix: F64, random: float, visibility: int, cont
         program=compile_light(lamp, context),
         visibility=visibility,
         cast_shadow=lamp.use_shadow,
-        lightgroup=subject.lightgroup,
         random=random,
     )
     _add_shape(light, lamp)

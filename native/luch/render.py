@@ -120,14 +120,19 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         count = _next_count(done, total, time.perf_counter() - prepared)
         step = _Step(renderer, done, count)
         step.start()
-        while step.is_alive():
-            step.join(WATCH_SECONDS)
-            if not step.is_alive() or cancelled or timed_out:
-                continue
-            timed_out = out_of_time() and done > 0
-            cancelled = not tell(done, count, False)
-            if cancelled or timed_out:
-                renderer.cancel()
+        try:
+            while step.is_alive():
+                step.join(WATCH_SECONDS)
+                if not step.is_alive() or cancelled or timed_out:
+                    continue
+                timed_out = out_of_time() and done > 0
+                cancelled = not tell(done, count, False)
+                if cancelled or timed_out:
+                    renderer.cancel()
+        except BaseException:  # Ctrl-C, or the caller's own: no thread may outlive the renderer
+            renderer.cancel()
+            step.join()
+            raise
         if step.error is not None:
             raise step.error
         if not cancelled and not timed_out:
