@@ -56,7 +56,7 @@ cpu::LampInput lamp_input(const py::dict& d) {
 class TestLights {
  public:
     TestLights(const py::list& lamps, const py::list& meshes, const py::list& instances, const py::dict& world,
-               bool light_tree) {
+               bool light_tree, size_t most_triangles) {
         for (auto item : meshes) add_mesh(item.cast<py::dict>());
         for (auto item : instances) add_instance(item.cast<py::dict>());
         std::vector<cpu::LampInput> inputs;
@@ -71,9 +71,10 @@ class TestLights {
         scene_.objects = objects_.data();
         scene_.material_table = table_.data();
         scene_.materials = materials_.data();
+        scene_.mesh_count = static_cast<u32>(meshes_.size());
         scene_.instance_count = static_cast<u32>(instances_.size());
         cpu::ThreadPool pool(1);
-        store_.build(scene_, inputs, world_input(world), estimates_, light_tree, pool);
+        store_.build(scene_, inputs, world_input(world), estimates_, light_tree, pool, most_triangles);
         scene_.lights = &store_.view();
     }
 
@@ -256,9 +257,9 @@ void bind_light(py::module_& m) {
         return py::make_tuple(d.x, d.y, d.z);
     });
     py::class_<TestLights>(light, "TestLights")
-        .def(py::init<py::list, py::list, py::list, py::dict, bool>(), py::arg("lamps") = py::list(),
+        .def(py::init<py::list, py::list, py::list, py::dict, bool, size_t>(), py::arg("lamps") = py::list(),
              py::arg("meshes") = py::list(), py::arg("instances") = py::list(), py::arg("world") = py::dict(),
-             py::arg("light_tree") = true)
+             py::arg("light_tree") = true, py::arg("most_triangles") = size_t{cpu::LightStore::MOST_TRIANGLES})
         .def("sample", &TestLights::sample)
         .def("pdf_triangle", &TestLights::pdf_triangle)
         .def("pdf_world", &TestLights::pdf_world)

@@ -54,13 +54,18 @@ Vec3 world_map_direction(int width, int height, int x, int y);
 
 class LightStore {
  public:
+    // Up to so many emissive triangles, over all instances, every one is in the tree (about 120 bytes each, twice
+    // that while building). Beyond, instances of meshes used more than once are one emitter each.
+    static constexpr size_t MOST_TRIANGLES = 2'000'000;
+
     LightStore();
     ~LightStore();
     // scene: meshes, instances, materials and material_table must be filled; SceneView::lights is not read.
     // material_emission_estimate: typical radiance per material, for choosing among lights. A material that may
     // emit and whose estimate is 0 counts as 1: it must stay reachable.
     void build(const SceneView& scene, const std::vector<LampInput>& lamps, const WorldInput& world,
-               const std::vector<Color>& material_emission_estimate, bool use_light_tree, ThreadPool& pool);
+               const std::vector<Color>& material_emission_estimate, bool use_light_tree, ThreadPool& pool,
+               size_t most_triangles = MOST_TRIANGLES);
     const LightsView& view() const { return view_; }
 
  private:

@@ -255,3 +255,27 @@ def test_a_closed_emissive_mesh_is_sampled_on_its_outside_only() -> None:
     opened = mesh_light(corners, triangles[:-1])
     s = opened.sample(rows(ORIGIN, 256), rows(UP, 256), False, numbers(256))
     assert len(set(s["prim"][s["kind"] == TRIANGLE])) > 2
+
+
+def test_instances_beyond_the_bound_are_one_emitter_each_and_give_the_same_light() -> None:
+    rng = np.random.default_rng(6)
+    mesh = {
+        "positions": rng.uniform(-0.2, 0.2, (30, 3)).astype(np.float32),
+        "triangles": np.arange(30, dtype=np.uint32).reshape(10, 3),
+        "emission_sampling": 3,
+    }
+    instances = []
+    for x, y, z in rng.uniform(-3, 3, (40, 3)):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] * rng.uniform(0.5, 2.0, 3)
+        matrix = np.hstack([turn, [[x], [y], [z + 5]]])
+        instances.append({"matrix": matrix.ravel().tolist(), "mesh": 0, "mirrored": bool(np.linalg.det(turn) < 0)})
+    each = core.light.TestLights(meshes=[mesh], instances=instances)
+    whole = core.light.TestLights(meshes=[mesh], instances=instances, most_triangles=100)
+    assert (each.counts()["emitters"], whole.counts()["emitters"]) == (400, 40)
+    truth = irradiance(each, ORIGIN, UP, 1 << 15)
+    assert irradiance(whole, ORIGIN, UP, 1 << 17) == pytest.approx(truth, rel=0.01)
+    s = whole.sample(rows(ORIGIN, 256), rows(UP, 256), False, numbers(256))
+    k = s["kind"] == TRIANGLE
+    pdf = whole.pdf_triangle(rows(ORIGIN, 256)[k], rows(UP, 256)[k], False, s["instance"][k], s["prim"][k],
+                             s["direction"][k], s["distance"][k])  # fmt: skip
+    np.testing.assert_allclose(pdf, s["pdf"][k], rtol=1e-3)

@@ -30,6 +30,14 @@ EmitterBounds lamp_bounds(const LampView& lamp);
 void build_light_tree(const std::vector<EmitterBounds>& bounds, ThreadPool& pool, std::vector<LightTreeNode>* nodes,
                       std::vector<u32>* slots);
 
+struct EmissiveArrays {
+    std::vector<InstanceLight> instances;
+    std::vector<u32> triangle_emitters;
+    std::vector<float> cluster_cdf;
+};
+void collect_emissive(const SceneView& scene, const std::vector<Color>& estimates, size_t most_triangles,
+                      EmissiveArrays* out, std::vector<Emitter>* emitters, std::vector<EmitterBounds>* bounds);
+
 // Sides of a mesh's triangles that are worth sampling when all of it emits: 1 (front) for a closed mesh, 2 if it
 // is inside out, 3 for an open one. From inside a closed emitter every ray finds it by itself.
 u8 outer_sides(const SceneView& scene, const MeshView& mesh);

@@ -10,100 +10,90 @@ namespace luch::cpu {
 namespace {
 
 constexpr int BINS = 12;
+constexpr u32 MANY = 4096;           // ranges of more are cut across their longest side only
 constexpr int DEEPEST_HEURISTIC = 24;  // below this depth ranges are halved by count: no pile is bottomless
 
-struct Cone {
-    Vec3 axis{0.0f, 0.0f, 1.0f};
-    float normals = -1.0f, emission = 0.0f;  // normals < 0: empty
-    bool two_sided = false;
+struct Item {
+    EmitterBounds e;
+    Vec3 center;
+    u32 index;
 };
 
-Vec3 rotate(Vec3 v, Vec3 unit_axis, float angle) {
-    float c = std::cos(angle), s = std::sin(angle);
-    return v * c + cross(unit_axis, v) * s + unit_axis * (dot(unit_axis, v) * (1.0f - c));
-}
-
-// Smallest cone around both, near enough. Two-sided normals may be flipped; beside one-sided ones they are both.
-Cone merge(Cone a, Cone b) {
-    if (a.normals < 0.0f) return b;
-    if (b.normals < 0.0f) return a;
-    Cone r = a.normals >= b.normals ? a : b;
-    const Cone& small = a.normals >= b.normals ? b : a;
-    r.emission = max_f(a.emission, b.emission);
-    if (a.two_sided != b.two_sided) {
-        r.normals = PI;
-        r.two_sided = false;
-        return r;
-    }
-    Vec3 other = (r.two_sided && dot(r.axis, small.axis) < 0.0f) ? -small.axis : small.axis;
-    float between = std::atan2(length(cross(r.axis, other)), dot(r.axis, other));
-    if (between + small.normals <= r.normals) return r;
-    float half = 0.5f * (between + r.normals + small.normals);
-    if (half >= PI) {
-        r.normals = PI;
-        return r;
-    }
-    Vec3 turn = normalize_or(cross(r.axis, other), {0.0f, 0.0f, 0.0f});
-    if (is_zero(turn)) {  // opposite axes: any common cone is everything
-        r.normals = PI;
-        return r;
-    }
-    r.axis = normalize_or(rotate(r.axis, turn, half - r.normals), r.axis);
-    r.normals = half;
-    return r;
-}
-
+// Sums over emitters: what the cuts are judged by and what a lane keeps.
 struct Bounds {
     Vec3 low{1e38f, 1e38f, 1e38f}, high{-1e38f, -1e38f, -1e38f};
-    Cone cone;
-    double intensity = 0.0, omni = 0.0;
-    double mean[3] = {0.0, 0.0, 0.0};  // normals by intensity, sum
-    u32 count = 0;
+    Vec3 mean{0.0f, 0.0f, 0.0f};  // normals by intensity, sum
+    float intensity = 0.0f, omni = 0.0f;
+    float emission_rad = 0.0f;
+    u32 count = 0, two_sided = 0;
 };
+
+void grow(Bounds* b, const Item& item) {
+    const EmitterBounds& e = item.e;
+    b->low = min_v(b->low, e.low);
+    b->high = max_v(b->high, e.high);
+    b->intensity += e.intensity;
+    b->omni += e.omni ? e.intensity : 0.0f;
+    // Two-sided normals have no sign of their own: add them on one side.
+    float sign = e.two_sided && dot(b->mean, e.axis) < 0.0f ? -e.intensity : e.intensity;
+    b->mean += e.axis * sign;
+    b->emission_rad = max_f(b->emission_rad, e.emission_rad);
+    b->two_sided += e.two_sided ? 1u : 0u;
+    b->count += 1u;
+}
 
 void grow(Bounds* b, const Bounds& other) {
     if (other.count == 0) return;
     b->low = min_v(b->low, other.low);
     b->high = max_v(b->high, other.high);
-    b->cone = merge(b->cone, other.cone);
     b->intensity += other.intensity;
     b->omni += other.omni;
-    // Two-sided normals have no sign of their own: add them on one side.
-    double along = b->mean[0] * other.mean[0] + b->mean[1] * other.mean[1] + b->mean[2] * other.mean[2];
-    double sign = other.cone.two_sided && along < 0.0 ? -1.0 : 1.0;
-    for (int i = 0; i < 3; ++i) b->mean[i] += sign * other.mean[i];
+    b->mean += other.mean * (other.two_sided == other.count && dot(b->mean, other.mean) < 0.0f ? -1.0f : 1.0f);
+    b->emission_rad = max_f(b->emission_rad, other.emission_rad);
+    b->two_sided += other.two_sided;
     b->count += other.count;
 }
 
-Bounds bounds_of(const EmitterBounds& e) {
-    Bounds b;
-    b.low = e.low;
-    b.high = e.high;
-    b.cone = {e.axis, e.normals_rad, e.emission_rad, e.two_sided};
-    b.intensity = e.intensity;
-    b.count = 1;
-    b.omni = e.omni ? e.intensity : 0.0f;
-    for (int i = 0; i < 3; ++i) b.mean[i] = static_cast<double>(e.intensity) * e.axis[i];
-    return b;
-}
-
-// Solid angle that the light of a cone of normals covers, weighted by its fall-off.
-float orientation_measure(const Cone& c) {
-    if (c.normals < 0.0f) return 0.0f;
-    float o = c.normals, w = std::min(o + c.emission, PI);
-    float measure = TWO_PI * (1.0f - std::cos(o)) +
-                    HALF_PI * (2.0f * w * std::sin(o) - std::cos(o - 2.0f * w) - 2.0f * o * std::sin(o) + std::cos(o));
-    return c.two_sided ? min_f(2.0f * measure, 2.0f * TWO_PI) : measure;
+// How widely the light of a range scatters: 0.1 for one normal, 1.1 for all directions. Stands for the solid angle
+// of its cone in the heuristic, without the cost of cones.
+float orientation_measure(const Bounds& b) {
+    float agreement = b.intensity > 0.0f ? min_f(length(b.mean) / b.intensity, 1.0f) : 0.0f;
+    float omni = b.intensity > 0.0f ? b.omni / b.intensity : 0.0f;
+    return mix_f(1.1f - agreement, 1.1f, omni);
 }
 
 // By the diagonal, not the surface: lamps on a line or in a plane have extent too.
-float extent_measure(const Bounds& b) { return b.count == 0 ? 0.0f : length_squared(b.high - b.low); }
-
 float cost_measure(const Bounds& b) {
-    return static_cast<float>(b.intensity) * (extent_measure(b) + 1e-12f) * orientation_measure(b.cone);
+    if (b.count == 0) return 0.0f;
+    return b.intensity * (length_squared(b.high - b.low) + 1e-12f) * orientation_measure(b);
 }
 
-Vec3 center(const EmitterBounds& e) { return (e.low + e.high) * 0.5f; }
+// A cone that holds all normals of a range: around their mean, as wide as the farthest.
+struct Cone {
+    Vec3 axis{0.0f, 0.0f, 1.0f};
+    float normals_rad = 0.0f;
+    bool two_sided = false;
+};
+
+Cone cone_of(const Item* begin, const Item* end, const Bounds& b) {
+    Cone cone;
+    cone.two_sided = b.two_sided == b.count;
+    cone.axis = normalize_or(b.mean, begin->e.axis);
+    if (b.two_sided != 0 && !cone.two_sided) {  // of both kinds
+        cone.normals_rad = PI;
+        return cone;
+    }
+    float least = 1.0f, widest = 0.0f;
+    for (const Item* i = begin; i < end; ++i) {
+        float c = dot(cone.axis, i->e.axis);
+        least = min_f(least, cone.two_sided ? abs_f(c) : c);
+        widest = max_f(widest, i->e.normals_rad);
+    }
+    float angle = end - begin == 1 ? 0.0f : std::acos(clamp_f(least, -1.0f, 1.0f)) + 1e-3f;
+    cone.normals_rad = min_f(angle + widest, PI);
+    return cone;
+}
+
 float component(Vec3 v, int axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
 
 struct Range {
@@ -114,18 +104,20 @@ struct Range {
 };
 
 class Builder {
-  public:
+ public:
     Builder(const std::vector<EmitterBounds>& emitters, std::vector<LightTreeNode>* nodes, std::vector<u32>* slots)
-        : emitters_(emitters), nodes_(*nodes), slots_(*slots), order_(emitters.size()) {
-        for (u32 i = 0; i < order_.size(); ++i) order_[i] = i;
+        : nodes_(*nodes), slots_(*slots), items_(emitters.size()) {
+        for (u32 i = 0; i < items_.size(); ++i)
+            items_[i] = {emitters[i], emitters[i].low * 0.5f + emitters[i].high * 0.5f, i};
         nodes_.clear();
         slots_.assign(emitters.size(), NONE);
     }
 
     void build() {
-        if (order_.empty()) return;
+        if (items_.empty()) return;
         nodes_.emplace_back(empty_node());
-        std::vector<Range> open{Range{0, static_cast<u32>(order_.size()), 0, measure(0, static_cast<u32>(order_.size())), 0}};
+        std::vector<Range> open{
+            Range{0, static_cast<u32>(items_.size()), 0, measure(0, static_cast<u32>(items_.size())), 0}};
         while (!open.empty()) {
             Range range = open.back();
             open.pop_back();
@@ -133,7 +125,7 @@ class Builder {
         }
     }
 
-  private:
+ private:
     static LightTreeNode empty_node() {
         LightTreeNode node{};
         node.parent_slot = NONE;
@@ -148,7 +140,7 @@ class Builder {
 
     Bounds measure(u32 begin, u32 end) const {
         Bounds b;
-        for (u32 i = begin; i < end; ++i) grow(&b, bounds_of(emitters_[order_[i]]));
+        for (u32 i = begin; i < end; ++i) grow(&b, items_[i]);
         return b;
     }
 
@@ -211,9 +203,9 @@ class Builder {
         for (size_t lane = 0; lane < parts.size(); ++lane) {
             Range& part = parts[lane];
             u32 slot = range.node * LIGHT_WIDTH + static_cast<u32>(lane);
-            set_lane(&nodes_[range.node], lane, part.bounds);
+            set_lane(&nodes_[range.node], lane, part);
             if (part.count() == 1) {
-                u32 emitter = order_[part.begin];
+                u32 emitter = items_[part.begin].index;
                 nodes_[range.node].child[lane] = emitter | CHILD_IS_EMITTER;
                 slots_[emitter] = slot;
                 continue;
@@ -227,7 +219,8 @@ class Builder {
         }
     }
 
-    static void set_lane(LightTreeNode* node, size_t i, const Bounds& b) {
+    void set_lane(LightTreeNode* node, size_t i, const Range& part) const {
+        const Bounds& b = part.bounds;
         Vec3 middle = b.low * 0.5f + b.high * 0.5f;
         Vec3 half = max_v(b.high - middle, middle - b.low);
         node->center_x[i] = middle.x;
@@ -236,32 +229,29 @@ class Builder {
         node->half_x[i] = half.x;
         node->half_y[i] = half.y;
         node->half_z[i] = half.z;
-        node->axis_x[i] = b.cone.axis.x;
-        node->axis_y[i] = b.cone.axis.y;
-        node->axis_z[i] = b.cone.axis.z;
-        double total = std::max(b.intensity, 1e-300);
-        float m[3], square = 0.0f;
-        for (int k = 0; k < 3; ++k) {
-            m[k] = static_cast<float>(b.mean[k] / total);
-            square += m[k] * m[k];
-        }
-        node->mean_x[i] = m[0];
-        node->mean_y[i] = m[1];
-        node->mean_z[i] = m[2];
-        node->spread[i] = max_f(1.0f - square, 0.0f);
-        node->omni[i] = static_cast<float>(b.omni / total);
-        float reach = b.cone.normals + b.cone.emission;
+        Cone cone = cone_of(items_.data() + part.begin, items_.data() + part.end, b);
+        node->axis_x[i] = cone.axis.x;
+        node->axis_y[i] = cone.axis.y;
+        node->axis_z[i] = cone.axis.z;
+        float reach = cone.normals_rad + b.emission_rad;
         node->cos_reach[i] = reach >= PI ? -2.0f : std::cos(reach);
-        node->fold[i] = b.cone.two_sided ? -1.0f : 1.0f;
-        node->intensity[i] = static_cast<float>(std::clamp(b.intensity, 1e-30, 1e30));
+        node->fold[i] = cone.two_sided ? -1.0f : 1.0f;
+        Vec3 mean = b.mean * (1.0f / b.intensity);
+        node->mean_x[i] = mean.x;
+        node->mean_y[i] = mean.y;
+        node->mean_z[i] = mean.z;
+        node->spread[i] = max_f(1.0f - length_squared(mean), 0.0f);
+        node->omni[i] = min_f(b.omni / b.intensity, 1.0f);
+        node->intensity[i] = b.intensity;
     }
 
     u32 halve(const Range& part, int axis) {
         u32 middle = part.begin + part.count() / 2;
-        std::nth_element(order_.begin() + part.begin, order_.begin() + middle, order_.begin() + part.end, [&](u32 a, u32 b) {
-            float ca = component(center(emitters_[a]), axis), cb = component(center(emitters_[b]), axis);
-            return ca != cb ? ca < cb : a < b;
-        });
+        std::nth_element(items_.begin() + part.begin, items_.begin() + middle, items_.begin() + part.end,
+                         [axis](const Item& a, const Item& b) {
+                             float ca = component(a.center, axis), cb = component(b.center, axis);
+                             return ca != cb ? ca < cb : a.index < b.index;
+                         });
         return middle;
     }
 
@@ -269,8 +259,8 @@ class Builder {
     u32 cut(const Range& part) {
         Vec3 low = make_vec3(1e38f), high = make_vec3(-1e38f);
         for (u32 i = part.begin; i < part.end; ++i) {
-            low = min_v(low, center(emitters_[order_[i]]));
-            high = max_v(high, center(emitters_[order_[i]]));
+            low = min_v(low, items_[i].center);
+            high = max_v(high, items_[i].center);
         }
         Vec3 size = high - low;
         int longest = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
@@ -280,20 +270,19 @@ class Builder {
         for (int axis = 0; axis < 3; ++axis) {
             float length = component(size, axis);
             if (!(length > 1e-30f && finite_f(length))) continue;
+            if (part.count() > MANY && axis != longest) continue;
             std::array<Bounds, BINS> bins{};
-            for (u32 i = part.begin; i < part.end; ++i) {
-                const EmitterBounds& e = emitters_[order_[i]];
-                grow(&bins[bin_of(component(center(e), axis), component(low, axis), length)], bounds_of(e));
-            }
+            for (u32 i = part.begin; i < part.end; ++i)
+                grow(&bins[bin_of(component(items_[i].center, axis), component(low, axis), length)], items_[i]);
             // Long boxes are cut across.
             try_cuts(bins, component(size, longest) / length, axis, &best, &best_axis, &best_bin);
         }
         if (best_axis < 0) return halve(part, longest);
         float start = component(low, best_axis), length = component(size, best_axis);
-        auto middle = std::partition(order_.begin() + part.begin, order_.begin() + part.end, [&](u32 e) {
-            return bin_of(component(center(emitters_[e]), best_axis), start, length) < static_cast<size_t>(best_bin);
+        auto middle = std::partition(items_.begin() + part.begin, items_.begin() + part.end, [&](const Item& item) {
+            return bin_of(component(item.center, best_axis), start, length) < static_cast<size_t>(best_bin);
         });
-        u32 at = static_cast<u32>(middle - order_.begin());
+        u32 at = static_cast<u32>(middle - items_.begin());
         return at == part.begin || at == part.end ? halve(part, longest) : at;
     }
 
@@ -322,10 +311,9 @@ class Builder {
         }
     }
 
-    const std::vector<EmitterBounds>& emitters_;
     std::vector<LightTreeNode>& nodes_;
     std::vector<u32>& slots_;
-    std::vector<u32> order_;
+    std::vector<Item> items_;
 };
 
 }  // namespace

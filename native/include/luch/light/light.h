@@ -82,6 +82,15 @@ struct LightTreeNode;  // light/tree.h
 struct LampBoxNode;    // light/closest_lamp.h
 struct Emitter;        // light/tree.h
 
+// An instance's part in the lights. Its triangles are emitters each, or the whole instance is one emitter (a
+// cluster) whose triangle a table picks: scenes of millions of instanced emissive triangles keep their size.
+struct InstanceLight {
+    u32 triangles;              // offset into triangle_emitters; NONE: emits nothing, or a cluster
+    u32 cluster;                // emitter; NONE: no cluster
+    u32 cdf;                    // offset into cluster_cdf
+    u32 sides;                  // worth sampling: 1 front, 2 back, 3 both
+};
+
 struct WorldLight {
     bool present, constant;
     Color radiance;             // constant
@@ -100,15 +109,15 @@ struct LightsView {
     const LampView* lamps;
     const Emitter* emitters;            // local lamps and triangles, in the order of (lamp | instance, prim)
     const LightTreeNode* nodes;         // nodes[0]: the root
-    const u32* instance_emitters;       // per instance: offset into triangle_emitters; NONE: emits nothing
-    const u32* triangle_emitters;       // emitter of each triangle of such instances; NONE
-    const u8* instance_sides;           // per instance: sides worth sampling, 1 front, 2 back, 3 both
-    const LampBoxNode* boxes;           // boxes[0]: the root
-    const u32* suns;                    // lamp indices
-    const float* sun_irradiance;        // luminance
+    const InstanceLight* instances;     // per instance
+    const u32* triangle_emitters;  // emitter of each triangle of instances in the tree triangle by triangle; NONE
+    const float* cluster_cdf;  // per shared cluster: triangle count + 1 entries, by area and radiance
+    const LampBoxNode* boxes;  // boxes[0]: the root
+    const u32* suns;  // lamp indices
+    const float* sun_irradiance;  // luminance
     u32 lamp_count, emitter_count, node_count, box_count, sun_count;
-    u32 hittable;                       // RayKind bits of the rays that can hit any lamp of finite size
-    bool uniform;                       // light tree off: every emitter is as likely
+    u32 hittable;  // RayKind bits of the rays that can hit any lamp of finite size
+    bool uniform;  // light tree off: every emitter is as likely
     WorldLight world;
 };
 

@@ -144,8 +144,15 @@ LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index,
     return s;
 }
 
-LUCH_FN_SLOW LightSample sample_chosen_triangle(const SceneView& scene, const Emitter& emitter, const LightQuery& q,
-                                                float probability, Vec2 u) {
+LUCH_FN_SLOW LightSample sample_chosen_triangle(const SceneView& scene, Emitter emitter, const LightQuery& q,
+                                                float probability, float u_cluster, Vec2 u) {
+    if (emitter.prim == NONE) {
+        const InstanceView& instance = scene.instances[emitter.instance];
+        const float* cdf = scene.lights->cluster_cdf + scene.lights->instances[emitter.instance].cdf;
+        float within;
+        emitter.prim = find_interval(cdf, scene.meshes[instance.mesh].triangle_count, u_cluster, &within);
+        probability *= cdf[emitter.prim + 1u] - cdf[emitter.prim];
+    }
     WorldTriangle triangle = make_world_triangle(scene, emitter.instance, emitter.prim, q.p);
     const TriangleCone& cone = triangle.cone;
     LightSample s = no_light_sample();
@@ -201,8 +208,9 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
         if (choice.emitter == NONE) return no_light_sample();
         const Emitter& emitter = lights.emitters[choice.emitter];
         float probability = choice.probability * shares.local;
-        return emitter.lamp != NONE ? sample_chosen_lamp(lights, emitter.lamp, q, probability, u)
-                                    : sample_chosen_triangle(scene, emitter, q, probability, u);
+        return emitter.lamp != NONE
+                   ? sample_chosen_lamp(lights, emitter.lamp, q, probability, u)
+                   : sample_chosen_triangle(scene, emitter, q, probability, cluster_unit(u_select, u), u);
     }
     u_select -= shares.local;
     // The last group takes what rounding leaves over.
@@ -220,9 +228,17 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
 LUCH_FN_SLOW float pdf_triangle(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, u32 instance, u32 prim,
                                 Vec3 direction, float distance) {
     const LightsView& lights = *scene.lights;
-    if (lights.emitter_count == 0u || lights.instance_emitters[instance] == NONE) return 0.0f;
-    u32 emitter = lights.triangle_emitters[static_cast<u64>(lights.instance_emitters[instance]) + prim];
-    if (emitter == NONE) return 0.0f;
+    if (lights.emitter_count == 0u) return 0.0f;
+    const InstanceLight& light = lights.instances[instance];
+    u32 emitter = light.cluster;
+    float share = 1.0f;
+    if (emitter != NONE) {
+        const float* cdf = lights.cluster_cdf + light.cdf + prim;
+        share = cdf[1] - cdf[0];
+    } else if (light.triangles != NONE) {
+        emitter = lights.triangle_emitters[static_cast<u64>(light.triangles) + prim];
+    }
+    if (emitter == NONE || !(share > 0.0f)) return 0.0f;
     WorldTriangle triangle = make_world_triangle(scene, instance, prim, p);
     if (!triangle.sends) return 0.0f;
     // From p itself: a ray that went straight through surfaces began its last piece elsewhere.
@@ -232,7 +248,7 @@ LUCH_FN_SLOW float pdf_triangle(const SceneView& scene, Vec3 p, Vec3 n, bool tra
     GroupShares shares;
     group_shares(lights, q, &shares);
     if (!(shares.local > 0.0f)) return 0.0f;
-    return shares.local * local_probability(lights, q, emitter) * triangle_cone_pdf(triangle.cone, distance);
+    return shares.local * local_probability(lights, q, emitter) * share * triangle_cone_pdf(triangle.cone, distance);
 }
 
 LUCH_FN_SLOW float pdf_lamp(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, const LampHit& hit,

@@ -30,7 +30,7 @@ struct alignas(64) LightTreeNode {
 
 struct Emitter {
     u32 lamp;            // NONE: a triangle
-    u32 instance, prim;
+    u32 instance, prim;  // prim NONE: a cluster, the whole instance
     u32 slot;            // LIGHT_WIDTH * node + lane where it hangs
 };
 
@@ -128,6 +128,11 @@ struct EmitterChoice {
 // A uniform float has 24 bits, which a deep descent uses up; the rest of the way goes on hashed bits.
 LUCH_FN float refresh_unit(float u, Vec2 other) {
     return unit_float(hash_u32(float_bits(u), float_bits(other.x), float_bits(other.y)));
+}
+
+// A number for the choice within a cluster, apart from the one above.
+LUCH_FN float cluster_unit(float u, Vec2 other) {
+    return unit_float(hash_u32(float_bits(u) ^ 0x9e3779b9u, float_bits(other.y), float_bits(other.x)));
 }
 
 // root_importance: of nodes[0], already computed, with its sum > 0.

@@ -30,7 +30,7 @@ LUCH_FN_SLOW WorldTriangle make_world_triangle(const SceneView& scene, u32 insta
         scene.materials[scene.material_table[at.first_material + (slot < last ? slot : last)]];
     // Mirrored instances swap the order of corners and with it what make_triangle_cone calls the front.
     bool front = (t.cone.height < 0.0f) != ((at.flags & INSTANCE_MIRRORED) != 0u);
-    u32 sides = material.emission_sampling & scene.lights->instance_sides[instance];
+    u32 sides = material.emission_sampling & scene.lights->instances[instance].sides;
     t.sends = t.cone.area > 0.0f && t.cone.height != 0.0f && (sides & (front ? 1u : 2u)) != 0u;
     return t;
 }

@@ -1,0 +1,210 @@
+// Emissive triangles of instances: one emitter each, or one for a whole instance where there are too many.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "cpu/light/build.h"
+#include "luch/light/triangle.h"
+
+namespace luch::cpu {
+namespace {
+
+const MaterialView& material_of(const SceneView& scene, const InstanceView& at, u32 slot, u32* index) {
+    u32 last = at.material_count > 0u ? at.material_count - 1u : 0u;
+    *index = scene.material_table[at.first_material + std::min(slot, last)];
+    return scene.materials[*index];
+}
+
+bool samples_as_light(const MaterialView& material) {
+    return (material.program.flags & PROGRAM_EMISSION) != 0u && material.emission_sampling != 0u;
+}
+
+bool any_light(const SceneView& scene, const InstanceView& at) {
+    if (at.visibility == 0u) return false;
+    for (u32 slot = 0; slot < std::max(at.material_count, 1u); ++slot) {
+        u32 index;
+        if (samples_as_light(material_of(scene, at, slot, &index))) return true;
+    }
+    return false;
+}
+
+// Everything on it emits and hides what lies behind.
+bool all_light(const SceneView& scene, const InstanceView& at) {
+    for (u32 slot = 0; slot < std::max(at.material_count, 1u); ++slot) {
+        u32 index;
+        const MaterialView& material = material_of(scene, at, slot, &index);
+        if (!samples_as_light(material) || (material.program.flags & PROGRAM_TRANSPARENT) != 0u) return false;
+    }
+    return true;
+}
+
+// False: no area, or not finite. sides: 1 front, 2 back, 3 both.
+bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, u32 sides, Color estimate, EmitterBounds* b) {
+    const InstanceView& at = scene.instances[instance];
+    const MeshView& mesh = scene.meshes[at.mesh];
+    const u32* index = scene.triangles + static_cast<u64>(mesh.first_triangle + prim) * 3u;
+    Vec3 corner[3];
+    for (int i = 0; i < 3; ++i)
+        corner[i] = transform_point(at.to_world, load_position(scene, mesh.first_vertex + index[i]));
+    Vec3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    float double_area = length(normal);
+    if (!(double_area > 0.0f && finite_f(double_area))) return false;
+    bool back_only = sides == 2u;
+    bool flip = back_only != ((at.flags & INSTANCE_MIRRORED) != 0u);
+    b->low = min_v(corner[0], min_v(corner[1], corner[2]));
+    b->high = max_v(corner[0], max_v(corner[1], corner[2]));
+    b->axis = normal / (flip ? -double_area : double_area);
+    b->normals_rad = 0.0f;
+    b->emission_rad = HALF_PI;
+    b->two_sided = sides == 3u;
+    float strength = luminance(abs_v(estimate));
+    b->intensity =
+        clamp_f((strength > 0.0f && finite_f(strength) ? strength : 1.0f) * 0.5f * double_area, 1e-30f, 1e30f);
+    return finite_v(b->low) && finite_v(b->high);
+}
+
+// Light of one triangle for choosing: luminance times area in object space; 0: it is no light.
+float cluster_weight(const SceneView& scene, const InstanceView& at, u32 prim, const std::vector<Color>& estimates,
+                     u32 sides) {
+    const MeshView& mesh = scene.meshes[at.mesh];
+    u32 index;
+    const MaterialView& material = material_of(scene, at, scene.material_slots[mesh.first_triangle + prim], &index);
+    if (!samples_as_light(material) || (material.emission_sampling & sides) == 0u) return 0.0f;
+    const u32* corner = scene.triangles + static_cast<u64>(mesh.first_triangle + prim) * 3u;
+    Vec3 a = load_position(scene, mesh.first_vertex + corner[0]);
+    float area = 0.5f * length(cross(load_position(scene, mesh.first_vertex + corner[1]) - a,
+                                     load_position(scene, mesh.first_vertex + corner[2]) - a));
+    float strength = index < estimates.size() ? luminance(abs_v(estimates[index])) : 1.0f;
+    float weight = area * (strength > 0.0f && finite_f(strength) ? strength : 1.0f);
+    return finite_f(weight) ? weight : 0.0f;
+}
+
+// Fills the emitters of all instances.
+class Collector {
+ public:
+    Collector(const SceneView& scene, const std::vector<Color>& estimates, EmissiveArrays* out,
+              std::vector<Emitter>* emitters, std::vector<EmitterBounds>* bounds)
+        : scene_(scene), estimates_(estimates), out_(*out), emitters_(*emitters), bounds_(*bounds) {}
+
+    void collect(size_t most_triangles) {
+        out_.instances.assign(scene_.instance_count, InstanceLight{NONE, NONE, 0u, 3u});
+        std::vector<u32> lit, uses(scene_.mesh_count, 0u);
+        size_t triangles = 0;
+        for (u32 i = 0; i < scene_.instance_count; ++i) {
+            if (!any_light(scene_, scene_.instances[i])) continue;
+            lit.push_back(i);
+            uses[scene_.instances[i].mesh] += 1u;
+            triangles += scene_.meshes[scene_.instances[i].mesh].triangle_count;
+        }
+        for (u32 i : lit) {
+            out_.instances[i].sides = sides_of(scene_.instances[i]);
+            if (triangles > most_triangles && uses[scene_.instances[i].mesh] > 1u)
+                add_cluster(i);
+            else
+                add_triangles(i);
+        }
+    }
+
+ private:
+    u32 sides_of(const InstanceView& at) {
+        if (!all_light(scene_, at)) return 3u;
+        auto [found, fresh] = sides_.try_emplace(at.mesh, 3u);
+        if (fresh) found->second = outer_sides(scene_, scene_.meshes[at.mesh]);
+        return found->second;
+    }
+
+    void add_triangles(u32 instance) {
+        const InstanceView& at = scene_.instances[instance];
+        const MeshView& mesh = scene_.meshes[at.mesh];
+        InstanceLight& light = out_.instances[instance];
+        u32 first = static_cast<u32>(out_.triangle_emitters.size());
+        out_.triangle_emitters.resize(first + mesh.triangle_count, NONE);
+        light.triangles = first;
+        for (u32 prim = 0; prim < mesh.triangle_count; ++prim) {
+            u32 index;
+            const MaterialView& material =
+                material_of(scene_, at, scene_.material_slots[mesh.first_triangle + prim], &index);
+            u32 sides = material.emission_sampling & light.sides;
+            if (!samples_as_light(material) || sides == 0u) continue;
+            EmitterBounds b{};
+            Color estimate = index < estimates_.size() ? estimates_[index] : Color{1.0f, 1.0f, 1.0f};
+            if (!triangle_bounds(scene_, instance, prim, sides, estimate, &b)) continue;
+            out_.triangle_emitters[first + prim] = static_cast<u32>(emitters_.size());
+            emitters_.push_back({NONE, instance, prim, NONE});
+            bounds_.push_back(b);
+        }
+    }
+
+    struct Cluster {
+        u32 cdf;
+        float light;      // sum of luminance times area, object space; 0: none
+        Vec3 low, high;   // object space
+    };
+
+    const Cluster& cluster_of(const InstanceView& at, u32 sides) {
+        auto [found, fresh] = clusters_.try_emplace({at.mesh, at.first_material}, Cluster{});
+        if (!fresh) return found->second;
+        const MeshView& mesh = scene_.meshes[at.mesh];
+        Cluster& c = found->second;
+        c = {static_cast<u32>(out_.cluster_cdf.size()), 0.0f, make_vec3(1e38f), make_vec3(-1e38f)};
+        std::vector<double> sums{0.0};
+        for (u32 prim = 0; prim < mesh.triangle_count; ++prim)
+            sums.push_back(sums.back() + cluster_weight(scene_, at, prim, estimates_, sides));
+        for (double sum : sums)
+            out_.cluster_cdf.push_back(sums.back() > 0.0 ? static_cast<float>(sum / sums.back()) : 0.0f);
+        c.light = static_cast<float>(sums.back());
+        for (u32 v = 0; v < mesh.vertex_count; ++v) {
+            Vec3 p = load_position(scene_, mesh.first_vertex + v);
+            if (!finite_v(p)) continue;
+            c.low = min_v(c.low, p);
+            c.high = max_v(c.high, p);
+        }
+        return c;
+    }
+
+    void add_cluster(u32 instance) {
+        const InstanceView& at = scene_.instances[instance];
+        InstanceLight& light = out_.instances[instance];
+        const Cluster& c = cluster_of(at, light.sides);
+        if (!(c.light > 0.0f)) return;
+        const float* m = at.to_world.m;
+        Vec3 middle = transform_point(at.to_world, (c.low + c.high) * 0.5f), half = (c.high - c.low) * 0.5f;
+        Vec3 reach = {abs_f(m[0]) * half.x + abs_f(m[1]) * half.y + abs_f(m[2]) * half.z,
+                      abs_f(m[4]) * half.x + abs_f(m[5]) * half.y + abs_f(m[6]) * half.z,
+                      abs_f(m[8]) * half.x + abs_f(m[9]) * half.y + abs_f(m[10]) * half.z};
+        Vec3 x = {m[0], m[4], m[8]}, y = {m[1], m[5], m[9]}, z = {m[2], m[6], m[10]};
+        float scale = (length_squared(x) + length_squared(y) + length_squared(z)) / 3.0f;  // of areas
+        EmitterBounds b{};
+        b.low = middle - reach;
+        b.high = middle + reach;
+        b.axis = {0.0f, 0.0f, 1.0f};
+        b.normals_rad = PI;
+        b.emission_rad = HALF_PI;
+        b.omni = true;
+        // Of a closed surface a quarter is seen from any side, by its mean cosine.
+        b.intensity = clamp_f(0.25f * c.light * scale, 1e-30f, 1e30f);
+        if (!finite_v(b.low) || !finite_v(b.high) || !finite_f(scale)) return;
+        light.cluster = static_cast<u32>(emitters_.size());
+        light.cdf = c.cdf;
+        emitters_.push_back({NONE, instance, NONE, NONE});
+        bounds_.push_back(b);
+    }
+
+    const SceneView& scene_;
+    const std::vector<Color>& estimates_;
+    EmissiveArrays& out_;
+    std::vector<Emitter>& emitters_;
+    std::vector<EmitterBounds>& bounds_;
+    std::map<u32, u32> sides_;                            // by mesh
+    std::map<std::pair<u32, u32>, Cluster> clusters_;     // by mesh and first material
+};
+
+}  // namespace
+
+void collect_emissive(const SceneView& scene, const std::vector<Color>& estimates, size_t most_triangles,
+                      EmissiveArrays* out, std::vector<Emitter>* emitters, std::vector<EmitterBounds>* bounds) {
+    Collector(scene, estimates, out, emitters, bounds).collect(most_triangles);
+}
+
+}  // namespace luch::cpu
