@@ -428,3 +428,13 @@ def test_nodes_give_what_cycles_gives(family: Callable[[], dict[str, Case]], tmp
     # The renderer runs the same programs; its points lie a little apart, so that jumps and slopes show.
     apart = np.abs(tiles.drawn - tiles.cycles)[tiles.hit] / scale[tiles.hit]
     assert (apart.max(-1) < 0.02).mean() > 0.985
+
+
+@pytest.mark.parametrize(("mirrored", "behind"), [(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize("family", [input_cases, normal_cases])
+def test_nodes_hold_in_a_mirror_and_from_behind(
+    family: Callable[[], dict[str, Case]], mirrored: bool, behind: bool, tmp_path: Path
+) -> None:
+    pictures = node_tiles.draw(family(), tmp_path, mirrored=mirrored, behind=behind)
+    apart = np.abs(pictures["LUCH"] - pictures["CYCLES"]) / np.maximum(1.0, np.abs(pictures["CYCLES"]))
+    assert (apart.max(-1) < 0.02).mean() > 0.985  # edges of tiles and of triangles may fall either way

@@ -67,14 +67,14 @@ def patch_mesh() -> bpy.types.Mesh:
     return mesh
 
 
-def placement(column: int, row: int) -> Matrix:
-    """Where a tile lies, how it is turned and scaled (not uniformly)."""
+def placement(column: int, row: int, mirrored: bool = False) -> Matrix:
+    """Where a tile lies, how it is turned and scaled (not uniformly, or to its mirror image)."""
     turn = Matrix.Rotation(0.3, 4, "X") @ Matrix.Rotation(-0.25, 4, "Y") @ Matrix.Rotation(0.2, 4, "Z")
-    size = Matrix.Diagonal((1.0, 0.85, 1.3, 1.0))
+    size = Matrix.Diagonal((-1.0 if mirrored else 1.0, 0.85, 1.3, 1.0))
     return Matrix.Translation((column * PITCH, row * PITCH, 0.3)) @ turn @ size
 
 
-def build(cases: dict[str, Case]) -> tuple[bpy.types.Scene, list[bpy.types.Object], int]:
+def build(cases: dict[str, Case], mirrored: bool = False) -> tuple[bpy.types.Scene, list[bpy.types.Object], int]:
     """A scene of tiles seen from straight above by an orthographic camera; tiles per side."""
     scene = empty_scene()
     side = int(np.ceil(np.sqrt(len(cases))))
@@ -86,7 +86,7 @@ def build(cases: dict[str, Case]) -> tuple[bpy.types.Scene, list[bpy.types.Objec
     objects = []
     for index, (name, case) in enumerate(cases.items()):
         tile = bpy.data.objects.new(name, mesh)
-        tile.matrix_world = placement(index % side, index // side)
+        tile.matrix_world = placement(index % side, index // side, mirrored)
         tile.pass_index, tile.color = 7, (0.2, 0.4, 0.6, 0.8)
         scene.collection.objects.link(tile)
         material = bpy.data.materials.new(name)
@@ -108,6 +108,7 @@ def build(cases: dict[str, Case]) -> tuple[bpy.types.Scene, list[bpy.types.Objec
     scene.camera = camera
     scene.view_layers[0].use_pass_position = True
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
+    scene.luch.pixel_filter_type, scene.luch.filter_width = "GAUSSIAN", 0.01
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
     bpy.context.view_layer.update()
     return scene, objects, side
@@ -124,7 +125,6 @@ def compare(cases: dict[str, Case], folder: Path) -> Tiles:
     size = side * TILE
     passes = render_passes("CYCLES", folder, width=size, height=size, samples=1)
     picture, position = passes["Combined"][::-1], passes["Position"][::-1].astype(np.float64)
-    scene.luch.pixel_filter_type, scene.luch.filter_width = "GAUSSIAN", 0.01
     ours = render_passes("LUCH", folder, width=size, height=size, samples=1)["Combined"][::-1]
     context = ExportContext(bpy.context.evaluated_depsgraph_get(), Scene())
     cycles = np.zeros((len(objects), TILE, TILE, 3), np.float32)
@@ -140,6 +140,19 @@ def compare(cases: dict[str, Case], folder: Path) -> Tiles:
         values = evaluate(program, mesh, tile, points, scene, size)
         luch[index][hit[index]] = values
     return Tiles(list(cases), cycles, luch, drawn, hit, context.result.warnings)
+
+
+def draw(cases: dict[str, Case], folder: Path, *, mirrored: bool, behind: bool) -> dict[str, F32]:
+    """Both engines' pictures of the cases, float32 (size, size, 3), of mirrored tiles or seen from below."""
+    scene, _, side = build(cases, mirrored)
+    if behind:
+        scene.camera.location.z, scene.camera.rotation_euler = -5.0, (np.pi, 0.0, 0.0)
+        bpy.context.view_layer.update()
+    size = side * TILE
+    return {
+        engine: render_passes(engine, folder, width=size, height=size, samples=1)["Combined"][..., :3]
+        for engine in ("CYCLES", "LUCH")
+    }
 
 
 def tile_points(mesh: Mesh, tile: Any, seen: F64) -> tuple[dict[str, Any], NDArray[np.bool_]]:

@@ -67,7 +67,9 @@ LUCH_FN Vec2 barycentrics_at(const OpContext& c, const u32* params) {
     Triangle t = triangle_at(*c.scene, c.scene->meshes[instance.mesh], c.points->prim[c.lane]);
     Vec3 edge_u = transform_direction(instance.to_world, t.p[1] - t.p[0]);
     Vec3 edge_v = transform_direction(instance.to_world, t.p[2] - t.p[0]);
-    return uv + barycentric_step(edge_u, edge_v, stencil_offset(c, params), geometric_normal_at(c));
+    // Seen from behind, Cycles turns both edges round: attributes step the other way than places do.
+    float side = (c.points->flags[c.lane] & PATH_BACKFACING) ? -1.0f : 1.0f;
+    return uv + barycentric_step(edge_u, edge_v, stencil_offset(c, params), geometric_normal_at(c)) * side;
 }
 
 struct AttributeValue {
