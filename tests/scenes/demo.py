@@ -215,7 +215,7 @@ def floor_lamp() -> None:
     linen = look.material("Linen", Base_Color=(0.75, 0.62, 0.43), Roughness=0.9)
     shade = [(0.235, 1.3), (0.15, 1.62), (0.146, 1.62), (0.231, 1.3), (0.235, 1.3)]
     make.lathe("Shade", shade, (x, y, 0.0), linen, smooth=False, steps=48)
-    lamp("POINT", "Bulb", (x, y, 1.44), 26.0, (1.0, 0.66, 0.36), shadow_soft_size=0.045)
+    lamp("POINT", "Bulb", (x, y, 1.44), 26.0, (1.0, 0.66, 0.36), shadow_soft_size=0.07)
 
 
 def lamp(kind: str, name: str, at: make.Point, power: float, color: look.Rgb, **properties: object) -> bpy.types.Object:
@@ -228,7 +228,7 @@ def lamp(kind: str, name: str, at: make.Point, power: float, color: look.Rgb, **
 
 def daylight(scene: bpy.types.Scene) -> None:
     """A low sun and a sky through the window, a soft panel for what the rest of the house sends in, a spot."""
-    sun = lamp("SUN", "Sun", (-4, -2, 4), 17.0, (1.0, 0.8, 0.58), angle=math.radians(0.6))
+    sun = lamp("SUN", "Sun", (-4, -2, 4), 17.0, (1.0, 0.8, 0.58), angle=math.radians(2.5))
     make.aim(sun, tuple(sun.location + Vector((1.0, 0.42, -0.62))))
     x, y, z = ROOM_X[0] - 0.35, sum(WINDOW_Y) / 2, sum(WINDOW_Z) / 2
     sky = lamp("AREA", "Window light", (x, y, z), 95.0, (0.72, 0.86, 1.0), shape="RECTANGLE", size=3.0, size_y=1.9)
@@ -236,7 +236,7 @@ def daylight(scene: bpy.types.Scene) -> None:
     fill = lamp("AREA", "Room light", (0.3, -4.6, 2.3), 24.0, (1.0, 0.9, 0.78), shape="RECTANGLE", size=3.6, size_y=1.6)
     make.aim(fill, (0.2, 2.0, 0.9))
     spot = lamp("SPOT", "Spot", (0.35, 0.9, 2.8), 60.0, (1.0, 0.83, 0.62), spot_size=math.radians(30), spot_blend=0.6,
-                shadow_soft_size=0.03)  # fmt: skip
+                shadow_soft_size=0.08)  # fmt: skip
     make.aim(spot, (0.5, 2.3, 0.9))
     world = bpy.data.worlds.new("Morning sky")
     scene.world = world
