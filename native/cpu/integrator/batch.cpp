@@ -71,32 +71,48 @@ void Batch::generate(const PixelBlock& block) {
             film_count_samples(writer_, (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0), false,
                                block.sample_count);
             PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples);
-            for (u32 s = 0; s < block.sample_count; s++) {
-                int k = ray_count_++;
-                PathState& path = paths_[k];
-                path = PathState{};
-                path.sampler = make_sampler(pixel, block.first_sample + s);
-                path.sample = block.first_sample + s;
-                Vec2 offset = sample_filter(scene_.filter, sample_2d(path.sampler, 0));
-                Vec2 lens = scene_.camera.aperture_radius > 0.0f ? sample_2d(path.sampler, 1) : Vec2{0.5f, 0.5f};
-                CameraRay camera = generate_ray(scene_.camera, {px + 0.5f + offset.x, py + 0.5f + offset.y}, lens);
-                path.throughput = path.feature_throughput = make_vec3(1.0f);
-                path.continuation = 1.0f;
-                path.min_pdf = 1e30f;
-                path.flags =
-                    u32(PATH_CAMERA) | PATH_NO_MIS | PATH_THROUGH_FILM | (wants_features() ? u32(PATH_FEATURES) : 0u);
-                path.visibility = RAY_CAMERA;
-                path.dimension = DIMENSIONS_CAMERA;
-                path.pixel = (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0);
-                path.mis_origin = camera.ray.origin;
-                path.footprint = camera.footprint;
-                path.spread = camera.spread;
-                rays_[k] = camera.ray;
-                ray_path_[k] = u32(k);
+            for (u32 s = 0; s < block.sample_count; s += CAMERA_LANES) {
+                u32 count = std::min(u32(CAMERA_LANES), block.sample_count - s);
+                generate_pixel(pixel, px, py, block.first_sample + s, count);
             }
         }
     }
     counts_.paths += u64(ray_count_);
+}
+
+void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
+    // Random numbers first, of all samples: that loop vectorises.
+    float filter_u[2][CAMERA_LANES], lens_u[2][CAMERA_LANES] = {};
+    for (u32 i = 0; i < count; i++) {
+        Vec2 u = sample_2d(make_sampler(pixel, first_sample + i), 0);
+        filter_u[0][i] = u.x, filter_u[1][i] = u.y;
+    }
+    for (u32 i = 0; i < count && scene_.camera.aperture_radius > 0.0f; i++) {
+        Vec2 u = sample_2d(make_sampler(pixel, first_sample + i), 1);
+        lens_u[0][i] = u.x, lens_u[1][i] = u.y;
+    }
+    for (u32 i = 0; i < count; i++) {
+        int k = ray_count_++;
+        PathState& path = paths_[k];
+        path = PathState{};
+        path.sampler = make_sampler(pixel, first_sample + i);
+        path.sample = first_sample + i;
+        Vec2 offset = sample_filter(scene_.filter, Vec2{filter_u[0][i], filter_u[1][i]});
+        Vec2 lens = scene_.camera.aperture_radius > 0.0f ? Vec2{lens_u[0][i], lens_u[1][i]} : Vec2{0.5f, 0.5f};
+        CameraRay camera = generate_ray(scene_.camera, {px + 0.5f + offset.x, py + 0.5f + offset.y}, lens);
+        path.throughput = path.feature_throughput = make_vec3(1.0f);
+        path.continuation = 1.0f;
+        path.min_pdf = 1e30f;
+        path.flags = u32(PATH_CAMERA) | PATH_NO_MIS | PATH_THROUGH_FILM | (wants_features() ? u32(PATH_FEATURES) : 0u);
+        path.visibility = RAY_CAMERA;
+        path.dimension = DIMENSIONS_CAMERA;
+        path.pixel = (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0);
+        path.mis_origin = camera.ray.origin;
+        path.footprint = camera.footprint;
+        path.spread = camera.spread;
+        rays_[k] = camera.ray;
+        ray_path_[k] = u32(k);
+    }
 }
 
 void Batch::traverse() {

@@ -15,6 +15,8 @@ namespace luch::cpu {
 
 // 2,048 paths: 64 chunks of lanes to sort by material, and about 600 KiB with their rays.
 inline constexpr int BATCH_PATHS = 2048;
+// Samples of a pixel whose first random numbers are drawn in one loop.
+inline constexpr int CAMERA_LANES = 16;
 
 // A shadow ray on its way, with the light it will bring if nothing blocks it.
 struct ShadowRay {
@@ -50,6 +52,7 @@ class Batch {
  private:
     // batch.cpp: the wavefront
     void generate(const PixelBlock& block);
+    void generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count);
     void traverse();
     void find_lamps();
     void shade_misses();
@@ -68,7 +71,8 @@ class Batch {
     void soften(const PathState& path, ClosureSet& set) const;
     bool apply_holdout(PathState& path, const ShadePoints& points, int lane, ClosureSet& set);
     void add_surface_emission(PathState& path, const Hit& hit, const ShadePoints& points, int lane, Color emission);
-    void scatter(PathState& path, u32 k, int lane);
+    void draw_numbers(const u32* queue, int lit_count);
+    void scatter(PathState& path, u32 k, int lane, Vec3 u);
     void pass_through(PathState& path, u32 k, int lane, Color weight);
     void choose_passes(PathState& path, const BsdfSample& s);
     void push_ray(u32 path, Vec3 origin, Vec3 direction);

@@ -34,8 +34,7 @@ void Batch::sample_lights(const u32* queue, int lit_count) {
         int lane = scratch_->lit_lanes[i];
         const ClosureSet& set = scratch_->sets[lane];
         if (set.count == 0 || !has_smooth_lobe(set)) continue;
-        const PathState& path = paths_[ray_path_[queue[lane]]];
-        Vec3 u = sample_3d(path.sampler, path.dimension + DIM_LIGHT);
+        Vec3 u = {scratch_->light_u[0][i], scratch_->light_u[1][i], scratch_->light_u[2][i]};
         samples[lane] = sample_light(scene_.view, lane_position(points, lane), lane_normal(points, lane),
                                      set_transmits(set), u.z, {u.x, u.y});
         const LightSample& s = samples[lane];

@@ -14,6 +14,8 @@ struct Batch::Scratch {
     LightSample samples[SHADE_LANES];
     Color emission[SHADE_LANES];
     int lit_lanes[SHADE_LANES];
+    // Random numbers of the lit lanes, in their order: x, y and a choice.
+    float light_u[3][SHADE_LANES], scatter_u[3][SHADE_LANES];
 };
 
 }  // namespace luch::cpu

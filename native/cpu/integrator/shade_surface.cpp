@@ -36,6 +36,7 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
         scratch_->lit_lanes[lit_count++] = lane;
     }
     if (lit_count == 0) return;
+    draw_numbers(queue, lit_count);
     if (scene_.has_lights) sample_lights(queue, lit_count);
     for (int i = 0; i < lit_count; i++) {
         int lane = scratch_->lit_lanes[i];
@@ -43,8 +44,26 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
         PathState& path = paths_[ray_path_[k]];
         if (writer_.film.layout.ambient_occlusion != NONE && (path.flags & PATH_CAMERA))
             sample_ao(path, ray_path_[k], lane);
-        scatter(path, k, lane);
+        const auto& u = scratch_->scatter_u;
+        scatter(path, k, lane, {u[0][i], u[1][i], u[2][i]});
     }
+}
+
+// All random numbers of the chunk in two loops, which vectorise: one by one they took a tenth of the time.
+void Batch::draw_numbers(const u32* queue, int lit_count) {
+    u32 seed[SHADE_LANES], index[SHADE_LANES], dimension[SHADE_LANES];
+    for (int i = 0; i < lit_count; i++) {
+        const PathState& path = paths_[ray_path_[queue[scratch_->lit_lanes[i]]]];
+        seed[i] = path.sampler.seed, index[i] = path.sampler.index, dimension[i] = path.dimension;
+    }
+    auto draw = [&](u32 event_dimension, float (&to)[3][SHADE_LANES]) {
+        for (int i = 0; i < lit_count; i++) {
+            Vec3 u = sample_3d(Sampler{seed[i], index[i]}, dimension[i] + event_dimension);
+            to[0][i] = u.x, to[1][i] = u.y, to[2][i] = u.z;
+        }
+    };
+    if (scene_.has_lights) draw(DIM_LIGHT, scratch_->light_u);
+    draw(DIM_BSDF, scratch_->scatter_u);
 }
 
 void Batch::setup_chunk(const u32* queue, int count, ShadePoints& points) {
@@ -130,13 +149,12 @@ void Batch::pass_through(PathState& path, u32 k, int lane, Color weight) {
     push_ray(ray_path_[k], origin, rays_[k].direction);
 }
 
-void Batch::scatter(PathState& path, u32 k, int lane) {
+void Batch::scatter(PathState& path, u32 k, int lane, Vec3 u) {
     const ShadePoints& points = scratch_->points;
     const ClosureSet& set = scratch_->sets[lane];
     float through = average(set.transparent), lobes = 0.0f;
     for (int i = 0; i < set.count; i++) lobes += set.lobes[i].sample_weight;
     if (!(through + lobes > 0.0f)) return;
-    Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
     float u_lobe = u.z;
     float through_probability = through / (through + lobes);
     if (u_lobe < through_probability) {
