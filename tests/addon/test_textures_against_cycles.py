@@ -144,7 +144,30 @@ def other_cases() -> list[Case]:
     return cases
 
 
-CASES = [*noise_cases(), *voronoi_cases(), *pattern_cases(), *spectrum_cases(), *sky_cases(), *other_cases()]
+def tiling_cases() -> list[Case]:
+    cases = []
+    shapes = ((5.0, 0.0), (5.0, 0.3), (6.0, 1.0), (4.6, 0.0), (2.0, 0.0), (1.0, 0.0))
+    for normalize in (True, False):
+        for sides, roundness in shapes:
+            for output in ("Segment Coordinates", "Segment ID", "Segment Width", "Segment Rotation"):
+                name = f"tiling {sides} {roundness} {normalize} {output}"
+                inputs = {"Sides": sides, "Roundness": roundness}
+                settings = {"normalize": normalize}
+                # Angles on the border of two segments may fall to either.
+                case = Case(name, "ShaderNodeRadialTiling", output, settings, inputs, "up", 1e-3, outliers=0.005)
+                cases.append(case)
+    return cases
+
+
+CASES = [
+    *noise_cases(),
+    *voronoi_cases(),
+    *pattern_cases(),
+    *spectrum_cases(),
+    *sky_cases(),
+    *other_cases(),
+    *tiling_cases(),
+]
 
 
 @pytest.fixture(scope="module")

@@ -276,3 +276,22 @@ def wavelength(c: Compiler, node: bpy.types.Node) -> Outputs:
     """Wavelength."""
     table = c.builder.table(spectrum.wavelength_table())
     return {"Color": c.builder.op3("WAVELENGTH", (c.float(node, "Wavelength"),), (table,))}
+
+
+@emitter("ShaderNodeRadialTiling")
+def radial_tiling(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Radial Tiling; a fractional number of sides cannot be rounded yet."""
+    tiling: Any = node
+    x, y = c.vector(node, "Vector")[:2]  # the socket itself has two components
+    sides, roundness = c.float(node, "Sides"), c.float(node, "Roundness")
+    number = c.builder.known(sides)
+    if (number is None or number % 1.0 != 0.0) and c.builder.known(roundness) != 0.0:
+        c.warn(node, "shows sharp corners where its number of sides is not whole")
+    out = c.builder.op("RADIAL_TILING", (x, y, sides, roundness), (int(tiling.normalize),))
+    coordinates = out[0], out[1], c.builder.constant(0.0)
+    return {
+        "Segment Coordinates": coordinates,
+        "Segment ID": out[2],
+        "Segment Width": out[3],
+        "Segment Rotation": out[4],
+    }

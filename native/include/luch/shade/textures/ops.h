@@ -5,6 +5,7 @@
 #include "luch/shade/textures/image_nodes.h"
 #include "luch/shade/textures/noise.h"
 #include "luch/shade/textures/patterns.h"
+#include "luch/shade/textures/radial_tiling.h"
 #include "luch/shade/textures/sky.h"
 #include "luch/shade/textures/spectral.h"
 #include "luch/shade/textures/voronoi.h"
