@@ -72,11 +72,16 @@ class Reporter:
     def _show_picture(self, progress: Any, writer: ResultWriter) -> None:
         """The film so far, ever less often: converting it costs, and late changes are small."""
         now = time.monotonic()
-        if bpy.app.background or not progress.new_picture or now < self._next_picture:
+        if not is_watched() or not progress.new_picture or now < self._next_picture:
             return
         writer.show(progress.passes())
         self._interval_s = min(self._interval_s * PICTURE_INTERVAL_GROWTH, LONGEST_PICTURE_INTERVAL_S)
         self._next_picture = time.monotonic() + self._interval_s
+
+
+def is_watched() -> bool:
+    """True if somebody can see the picture grow."""
+    return not bpy.app.background
 
 
 def progress_line(progress: Any) -> str:

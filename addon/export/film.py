@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from luch.scene import Film
 
 from .. import passes
@@ -44,6 +45,7 @@ def _border(render: Any, width: int, height: int) -> tuple[int, int, int, int] |
     """The rectangle that Blender allocates for a border: fractions of the frame, cut to whole pixels."""
     if not render.use_border:
         return None
-    x0, x1 = int(render.border_min_x * width), int(render.border_max_x * width)
-    y0, y1 = int(render.border_min_y * height), int(render.border_max_y * height)
+    # In single precision, as Blender multiplies: 0.7 of 10 is 7, in double it would be 6.99999988.
+    x0, x1 = (int(np.float32(edge) * np.float32(width)) for edge in (render.border_min_x, render.border_max_x))
+    y0, y1 = (int(np.float32(edge) * np.float32(height)) for edge in (render.border_min_y, render.border_max_y))
     return (x0, y0, max(x1, x0 + 1), max(y1, y0 + 1))

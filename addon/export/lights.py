@@ -25,7 +25,7 @@ def export_light(subject: Any, matrix: F64, random: float, visibility: int, cont
         color=(float(colour[0]), float(colour[1]), float(colour[2])),
         power=lamp.energy,
         normalize=lamp.normalize,
-        program=compile_light(lamp, context),
+        program=None if _is_plain(lamp.node_tree) else compile_light(lamp, context),
         visibility=visibility,
         cast_shadow=lamp.use_shadow,
         random=random,
@@ -41,6 +41,18 @@ def export_light(subject: Any, matrix: F64, random: float, visibility: int, cont
             )
             light.power = 0.0
     return light
+
+
+def _is_plain(tree: Any) -> bool:
+    """True for the tree that Blender gives every lamp: Emission of white, strength 1. It changes nothing."""
+    output = tree.get_output_node("CYCLES") if tree is not None else None
+    if output is None or len(output.inputs["Surface"].links) != 1:
+        return False
+    node = output.inputs["Surface"].links[0].from_node
+    if node.bl_idname != "ShaderNodeEmission" or node.mute or any(socket.is_linked for socket in node.inputs):
+        return False
+    color, strength = node.inputs["Color"].default_value, node.inputs["Strength"].default_value
+    return strength == 1.0 and tuple(color)[:3] == (1.0, 1.0, 1.0)
 
 
 def _add_shape(light: Light, lamp: Any) -> None:

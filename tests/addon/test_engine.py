@@ -16,7 +16,7 @@ import pytest
 from luch.scene import Scene
 from support.pictures import read_passes
 
-from addon import engine
+from addon import engine, report, result
 
 MULTILAYER = "OPEN_EXR_MULTILAYER"
 
@@ -90,6 +90,18 @@ def test_a_cropped_border_is_as_large_as_blender_wants_it(room: bpy.types.Scene)
     assert picture(room)["Combined"].shape == (12, 16, 4)
 
 
+def test_borders_are_cut_where_blender_cuts_them(room: bpy.types.Scene) -> None:
+    render = room.render
+    render.use_border = render.use_crop_to_border = True
+    random = np.random.default_rng(5)
+    edges = [0.0, 0.1, 0.2, 0.3, 0.6, 0.7, 0.9, 1.0, *random.random(8)]
+    for _ in range(24):
+        render.resolution_x, render.resolution_y = (int(n) for n in random.integers(10, 60, 2))
+        render.border_min_x, render.border_max_x = sorted(random.choice(edges, 2, replace=False))
+        render.border_min_y, render.border_max_y = sorted(random.choice(edges, 2, replace=False))
+        assert bpy.ops.render.render() == {"FINISHED"}
+
+
 @pytest.mark.parametrize("size", [(4, 4), (5, 17)])
 def test_tiny_frames_render(room: bpy.types.Scene, size: tuple[int, int]) -> None:
     room.render.resolution_x, room.render.resolution_y = size
@@ -144,6 +156,23 @@ def test_a_cancelled_render_returns_at_once_with_the_film_so_far(
     assert time.monotonic() - start < 0.5 + 0.5 + 1.0, "Blender itself may take a second for the file"
     assert combined.any()
     assert engine.last_stats[room.name]["cancelled"]
+
+
+def test_the_picture_is_shown_while_it_grows(room: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[float] = []
+    original = result.ResultWriter.show
+
+    def spy(self: Any, passes: Any) -> None:
+        original(self, passes)
+        shown.append(float(passes["Combined"].sum()))
+
+    monkeypatch.setattr(result.ResultWriter, "show", spy)
+    monkeypatch.setattr(report, "is_watched", lambda: True)
+    monkeypatch.setattr(report, "FIRST_PICTURE_S", 0.0)
+    room.luch.samples = 16
+    combined = picture(room)["Combined"]
+    assert len(shown) >= 2
+    assert shown[-1] == pytest.approx(float(combined.sum()), rel=0.2)
 
 
 def test_an_animation_renders_its_frames(room: bpy.types.Scene, tmp_path: Path) -> None:

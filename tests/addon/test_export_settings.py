@@ -130,6 +130,14 @@ def test_area_lamps_have_two_sizes_where_their_shape_does(scene: bpy.types.Scene
     assert light.spread == pytest.approx(math.pi / 2.0)
 
 
+def test_the_shader_that_every_lamp_is_given_is_no_shader(scene: bpy.types.Scene) -> None:
+    lamp = add_lamp(scene, "POINT").data
+    lamp.use_nodes = True
+    assert export_lamp(scene).program is None
+    lamp.node_tree.nodes["Emission"].inputs["Strength"].default_value = 2.0
+    assert export().lights[0].program is not None
+
+
 def test_instanced_lamps_shine_from_each_place(scene: bpy.types.Scene) -> None:
     collection = bpy.data.collections.new("Lamps")
     lamp = add_lamp(scene, "POINT")
