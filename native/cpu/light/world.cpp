@@ -110,9 +110,8 @@ WorldLight build_world(const WorldInput& in, WorldArrays* arrays) {
     if (w.has_sun) {
         w.sun_direction = normalize_or(in.sun_direction, {0.0f, 0.0f, 1.0f});
         w.sun_one_minus_cos = static_cast<float>(2.0 * sine * sine);
-        double share = sun_irradiance / (sun_irradiance + map_irradiance);
-        // A map that is black beside its sun needs no part of its own.
-        w.sun_probability = map_irradiance > 0.0 ? static_cast<float>(0.1 + 0.8 * share) : 0.999f;
+        w.sun_irradiance = static_cast<float>(std::fmin(sun_irradiance, 1e30));
+        w.map_irradiance = static_cast<float>(std::fmin(map_irradiance, 1e30));
     }
     w.irradiance = static_cast<float>(std::fmin(map_irradiance + sun_irradiance, 1e30));
     return w;

@@ -102,7 +102,8 @@ struct WorldLight {
     u32 visibility, lightgroup;
     bool has_sun;               // an extra cone around the sun of a sky texture
     Vec3 sun_direction;
-    float sun_one_minus_cos, sun_probability;
+    float sun_one_minus_cos;
+    float sun_irradiance, map_irradiance;  // luminance, of the sun's disk faced squarely and of the rest
 };
 
 struct LightsView {

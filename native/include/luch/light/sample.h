@@ -58,7 +58,10 @@ LUCH_FN_SLOW void group_shares(const LightsView& lights, const LightQuery& q, Gr
         s->root_ready = true;
     }
     if (lights.sun_count > 0u) s->suns = suns_importance(lights, q);
-    if (any_world) s->world = lights.world.irradiance;
+    if (any_world) {
+        const WorldLight& w = lights.world;
+        s->world = w.has_sun ? w.map_irradiance + world_sun_irradiance(w, q.n, q.transmits) : w.irradiance;
+    }
     float total = s->local + s->suns + s->world;
     bool even_world = lights.world.constant && !lights.world.has_sun;
     float active = (s->local > 0.0f ? 1.0f : 0.0f) + (s->suns > 0.0f ? 1.0f : 0.0f) +

@@ -95,22 +95,37 @@ LUCH_FN bool in_world_sun(const WorldLight& w, Vec3 d) {
     return length_squared(d - w.sun_direction) <= 2.0f * w.sun_one_minus_cos;
 }
 
+// Irradiance of the sun of a sky on a surface with this normal; 0 only where it stands below the horizon.
+LUCH_FN float world_sun_irradiance(const WorldLight& w, Vec3 n, bool transmits) {
+    float c = dot(n, w.sun_direction);
+    c = transmits ? abs_f(c) : c;
+    float sine = safe_sqrt(w.sun_one_minus_cos * (2.0f - w.sun_one_minus_cos));
+    return w.sun_irradiance * (is_zero(n) ? 1.0f : clamp_f(c + sine, 0.0f, 1.0f));
+}
+
+// The sun's share of the samples. The even part of the sky is found by rays.
+LUCH_FN float world_sun_probability(const WorldLight& w, Vec3 n, bool transmits) {
+    float sun = world_sun_irradiance(w, n, transmits);
+    return 0.95f * safe_divide(sun, sun + w.map_irradiance);
+}
+
 // Density of sample_world at d, the world being chosen.
 LUCH_FN_SLOW float world_direction_pdf(const WorldLight& w, Vec3 n, bool transmits, Vec3 d) {
     float pdf = w.constant ? world_uniform_pdf(n, transmits, d) : world_map_pdf(w, d);
     if (!w.has_sun) return pdf;
     float sun = in_world_sun(w, d) ? 1.0f / (TWO_PI * w.sun_one_minus_cos) : 0.0f;
-    return mix_f(pdf, sun, w.sun_probability);
+    return mix_f(pdf, sun, world_sun_probability(w, n, transmits));
 }
 
 LUCH_FN_SLOW Vec3 sample_world(const WorldLight& w, Vec3 n, bool transmits, Vec2 u) {
     if (w.has_sun) {
-        if (u.x < w.sun_probability) {
+        float probability = world_sun_probability(w, n, transmits);
+        if (u.x < probability) {
             Vec3 t, b;
             make_frame(w.sun_direction, &t, &b);
-            return to_world(sample_cone(w.sun_one_minus_cos, {u.x / w.sun_probability, u.y}), t, b, w.sun_direction);
+            return to_world(sample_cone(w.sun_one_minus_cos, {u.x / probability, u.y}), t, b, w.sun_direction);
         }
-        u.x = min_f((u.x - w.sun_probability) / (1.0f - w.sun_probability), 0.99999994f);
+        u.x = min_f((u.x - probability) / (1.0f - probability), 0.99999994f);
     }
     return w.constant ? sample_world_uniform(n, transmits, u) : sample_world_map(w, u);
 }
