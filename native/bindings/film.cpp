@@ -50,15 +50,16 @@ cpu::FilmSpec read_film(const py::handle& film, const py::handle& origin) {
 
 py::dict resolve_film(const cpu::Film& film) {
     py::dict passes;
+    std::vector<float*> out;
     for (const cpu::Pass& pass : film.passes()) {
         Floats pixels({py::ssize_t{film.height()}, py::ssize_t{film.width()}, py::ssize_t{pass.channels}});
-        float* to = pixels.mutable_data();
-        {
-            py::gil_scoped_release release;
-            film.resolve(pass, to);
-        }
+        out.push_back(pixels.mutable_data());
         passes[py::str(pass.name)] = pixels;
     }
+    py::gil_scoped_release release;
+    // Threads of its own: a renderer's may be busy with the next step. Small films are not worth any.
+    cpu::ThreadPool pool(u64{film.width()} * film.height() < 65536 ? 1 : 0);
+    film.resolve(out, pool);
     return passes;
 }
 

@@ -1,5 +1,6 @@
 // The renderer as Python sees it: one scene, rendered in steps, readable at any time between them.
 #include "bindings/bind.h"
+#include "bindings/film.h"
 #include "bindings/scene_reader.h"
 
 namespace luch::bindings {
@@ -22,21 +23,7 @@ class PyRenderer {
     void cancel() { renderer_->cancel(); }
     double step_progress() const { return renderer_->step_progress(); }
 
-    py::dict passes() const {
-        const cpu::Film& film = renderer_->film();
-        py::dict result;
-        for (const cpu::Pass& pass : film.passes()) {
-            py::array_t<float> image(
-                {py::ssize_t(film.height()), py::ssize_t(film.width()), py::ssize_t(pass.channels)});
-            float* data = image.mutable_data();
-            {
-                py::gil_scoped_release release;
-                film.resolve(pass, data);
-            }
-            result[py::str(pass.name)] = image;
-        }
-        return result;
-    }
+    py::dict passes() const { return resolve_film(renderer_->film()); }
 
     py::dict stats() const {
         cpu::RenderStats s = renderer_->stats();

@@ -245,13 +245,14 @@ Film::Film(const FilmSpec& spec) : spec_(spec) {
     passes_ = std::move(builder.passes);
     u64 pixels = static_cast<u64>(spec.width) * spec.height;
     if (pixels >= NONE) throw std::invalid_argument("Film: more than 2^32 pixels. Render it in parts, with a border.");
-    rows_.assign(pixels * layout_.stride, 0.0);
+    rows_.reset(static_cast<FilmSum*>(std::calloc(pixels * layout_.stride, sizeof(FilmSum))));
+    if (!rows_) throw std::bad_alloc();
     counts_.assign(pixels, 0);
 }
 
 FilmView Film::view() {
     FilmView view{};
-    view.rows = rows_.data();
+    view.rows = rows_.get();
     view.sample_counts = counts_.data();
     view.layout = layout_;
     view.width = spec_.width, view.height = spec_.height;
@@ -260,18 +261,26 @@ FilmView Film::view() {
     return view;
 }
 
-void Film::resolve(const Pass& pass, float* out) const {
-    for (size_t pixel = 0; pixel < counts_.size(); ++pixel, out += pass.channels) {
-        if (counts_[pixel] == 0) {
-            std::fill(out, out + pass.channels, 0.0f);
-            continue;
+void Film::resolve(const std::vector<float*>& out, ThreadPool& pool) const {
+    // Pass after pass over a block of rows that stays in the second-level cache.
+    pool.parallel_for(counts_.size(), 128, [&](size_t begin, size_t end, unsigned) {
+        for (size_t i = 0; i < passes_.size(); ++i) {
+            const Pass& pass = passes_[i];
+            float* to = out[i] + begin * pass.channels;
+            for (size_t pixel = begin; pixel < end; ++pixel, to += pass.channels) {
+                if (counts_[pixel] == 0) {
+                    std::fill(to, to + pass.channels, 0.0f);
+                } else {
+                    read_pixel(pass, rows_.get() + pixel * layout_.stride, layout_, counts_[pixel], spec_.exposure, to);
+                }
+            }
         }
-        read_pixel(pass, rows_.data() + pixel * layout_.stride, layout_, counts_[pixel], spec_.exposure, out);
-    }
+    });
 }
 
 void Film::merge(const Film& other) {
-    if (other.rows_.size() != rows_.size() || other.passes_.size() != passes_.size())
+    if (other.counts_.size() != counts_.size() || other.layout_.stride != layout_.stride ||
+        other.passes_.size() != passes_.size())
         throw std::invalid_argument("Film: only films of the same size and passes merge.");
     std::vector<bool> first_only(layout_.stride, false), crypto(layout_.stride, false);
     for (const Pass& pass : passes_) {
@@ -282,8 +291,8 @@ void Film::merge(const Film& other) {
     }
     FilmWriter writer{view(), 0};
     for (size_t pixel = 0; pixel < counts_.size(); ++pixel) {
-        FilmSum* to = rows_.data() + pixel * layout_.stride;
-        const FilmSum* from = other.rows_.data() + pixel * layout_.stride;
+        FilmSum* to = rows_.get() + pixel * layout_.stride;
+        const FilmSum* from = other.rows_.get() + pixel * layout_.stride;
         for (u32 c = 0; c < layout_.stride; ++c) {
             if (first_only[c]) {
                 if (counts_[pixel] == 0) to[c] = from[c];

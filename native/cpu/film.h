@@ -1,8 +1,11 @@
 // Owns the film's memory and reads passes out of it.
 #pragma once
+#include <cstdlib>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "cpu/thread_pool.h"
 #include "luch/film/film.h"
 
 namespace luch::cpu {
@@ -57,22 +60,20 @@ class Film {
     u32 width() const { return spec_.width; }
     u32 height() const { return spec_.height; }
 
-    // Writes height * width * pass.channels floats, bottom row first. Pixels without samples are 0.
-    void resolve(const Pass& pass, float* out) const;
+    // Writes every pass: out[i] holds height * width * passes()[i].channels floats, bottom row first. Pixels
+    // without samples are 0.
+    void resolve(const std::vector<float*>& out, ThreadPool& pool) const;
 
     // Adds what another film of the same layout holds, e.g. other samples of the same picture. What the
     // first sample sees is kept where this film has samples.
     void merge(const Film& other);
 
-    // Raw rows, for sending a film elsewhere: width * height * stride sums, then the counts.
-    const std::vector<FilmSum>& rows() const { return rows_; }
-    const std::vector<u32>& sample_counts() const { return counts_; }
-
  private:
     FilmSpec spec_;
     FilmLayout layout_;
     std::vector<Pass> passes_;
-    std::vector<FilmSum> rows_;
+    // From calloc: pages are zeroed when a worker first touches them, not all at once by one thread.
+    std::unique_ptr<FilmSum[], void (*)(void*)> rows_{nullptr, std::free};
     std::vector<u32> counts_;
 };
 
