@@ -1,7 +1,9 @@
 // Emissive triangles of instances: one emitter each, or one for a whole instance where there are too many.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "cpu/light/build.h"
@@ -130,10 +132,26 @@ class Collector {
             EmitterBounds b{};
             Color estimate = index < estimates_.size() ? estimates_[index] : Color{1.0f, 1.0f, 1.0f};
             if (!triangle_bounds(scene_, instance, prim, sides, estimate, &b)) continue;
+            if (!places_.insert(place_of(at, mesh, prim)).second) continue;
             out_.triangle_emitters[first + prim] = static_cast<u32>(emitters_.size());
             emitters_.push_back({NONE, instance, prim, NONE});
             bounds_.push_back(b);
         }
+    }
+
+    // A triangle's place, whatever the order of its corners. Of emitters that lie in one place rays only ever
+    // meet the first (equal distance: the smaller instance, then prim); sampling the others too would count
+    // their light twice.
+    using Place = std::array<std::array<float, 3>, 3>;
+    Place place_of(const InstanceView& at, const MeshView& mesh, u32 prim) const {
+        const u32* index = scene_.triangles + static_cast<u64>(mesh.first_triangle + prim) * 3u;
+        Place place;
+        for (int i = 0; i < 3; ++i) {
+            Vec3 p = transform_point(at.to_world, load_position(scene_, mesh.first_vertex + index[i]));
+            place[static_cast<size_t>(i)] = {p.x, p.y, p.z};
+        }
+        std::sort(place.begin(), place.end());
+        return place;
     }
 
     struct Cluster {
@@ -196,6 +214,7 @@ class Collector {
     EmissiveArrays& out_;
     std::vector<Emitter>& emitters_;
     std::vector<EmitterBounds>& bounds_;
+    std::set<Place> places_;                              // of the triangles that became emitters
     std::map<u32, u32> sides_;                            // by mesh
     std::map<std::pair<u32, u32>, Cluster> clusters_;     // by mesh and first material
 };
