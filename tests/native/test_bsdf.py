@@ -259,6 +259,17 @@ def test_filter_glossy_blurs_sharp_lobes() -> None:
     assert drawn["roughness"] == pytest.approx(0.25)
 
 
+def test_only_blurred_glass_counts_facets_seen_from_behind() -> None:
+    """As Cycles draws Filter Glossy; a lobe that is rough by itself sends no such light."""
+    wo = (math.sin(1.3), 0.0, math.cos(1.3))
+    beyond = np.array([[0.995, 0.0, -0.0998]], np.float32)  # no facet bends the view that far back
+    blurred = core.bsdf.Closures("glass", {"roughness": 0.0, "distribution": "GGX"}, wo=wo)
+    blurred.blur(0.25)
+    rough = core.bsdf.Closures("glass", {"roughness": 0.5, "distribution": "GGX"}, wo=wo)
+    assert rough.eval(beyond)[0].sum() == 0.0
+    assert blurred.eval(beyond)[0].sum() > 0.0
+
+
 def test_a_misspelt_input_is_an_error() -> None:
     with pytest.raises(ValueError, match="rougness"):
         closures("glossy", {"rougness": 0.1})

@@ -176,6 +176,8 @@ LUCH_FN void blur_closures(ClosureSet& set, float roughness) {
     for (int i = 0; i < set.count; ++i) {
         Lobe& lobe = set.lobes[i];
         if (lobe.type < LobeType::MICROFACET_REFLECTION) continue;
+        if (!(min_f(lobe.alpha_x, lobe.alpha_y) < roughness)) continue;
+        lobe.flags |= LOBE_BLURRED;
         lobe.alpha_x = max_f(lobe.alpha_x, roughness);
         lobe.alpha_y = max_f(lobe.alpha_y, roughness);
     }

@@ -37,6 +37,7 @@ enum LobeFlag : u8 {
     LOBE_MIRRORED = 1u,
     LOBE_BUMPED = 2u,     // normal is not the interpolated one: light leaks must be tested for
     LOBE_SOFTENED = 4u,   // bumped diffuse lobe whose terminator is softened
+    LOBE_BLURRED = 8u,    // Filter Glossy has made it rougher
 };
 
 struct Lobe {

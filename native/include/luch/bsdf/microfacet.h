@@ -119,8 +119,11 @@ LUCH_FN_SLOW LobeValue eval_microfacet(const Lobe& l, Vec3 wo, Vec3 wi) {
         angles = facet_angles_isotropic(l, h, cos_o, cos_i);
     }
     float cos_ho = dot(h, wo), cos_hi = dot(h, wi);
-    // The facet is seen by both from its right side, or no light takes this way.
-    if (through && !(cos_ho * angles.cos_h > 0.0f && cos_hi * angles.cos_h < 0.0f)) return no_value();
+    // The facet is seen by both from its right side, or no light takes this way. Cycles does not ask. In
+    // lobes as they are that is light from nowhere; where Filter Glossy has blurred one, which is an
+    // approximation whose look users know, it is 1 % of what lies under glass: there neither do we.
+    if (through && !(l.flags & LOBE_BLURRED) && !(cos_ho * angles.cos_h > 0.0f && cos_hi * angles.cos_h < 0.0f))
+        return no_value();
     FresnelTerm fresnel = fresnel_term(l, abs_f(cos_ho));
     float reflects = can_transmit(l) ? reflect_probability(fresnel) : 1.0f;
     Facets f = facets(l, angles);
