@@ -1,7 +1,8 @@
-"""Attributes that Blender does not store and shaders may ask for: Random Per Island and Pointiness."""
+"""Values that Blender does not store on meshes and shaders may ask for: islands, pointiness, properties."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,34 @@ def pointiness(positions: F32, normals: F32, edges: NDArray[np.int32]) -> F32:
     sharp = np.where(degree > 0, np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi, 0.0)
     blurred = sharp + np.bincount(a, sharp[b], count) + np.bincount(b, sharp[a], count)
     result: F32 = (blurred / (degree + 1)).astype(np.float32)[place]
+    return result
+
+
+def property_color(owners: Iterable[Any], path: str) -> tuple[float, float, float, float] | None:
+    """A property of the first owner that has it, as a colour; custom properties win. None: nobody has it."""
+    for owner in owners:
+        for spelled in (f'["{path}"]', path):
+            try:
+                found = owner.path_resolve(spelled)
+            except (AttributeError, ValueError, TypeError):
+                continue
+            if isinstance(found, int | float):
+                return float(found), float(found), float(found), 1.0
+            numbers = [float(number) for number in found] if hasattr(found, "__len__") and len(found) in (3, 4) else []
+            if numbers:
+                red, green, blue, alpha = (*numbers, 1.0)[:4]
+                return red, green, blue, alpha
+    return None
+
+
+def object_attributes(wanted: Iterable[str], subject: Any, parent: Any) -> dict[str, tuple[float, float, float, float]]:
+    """What Attribute nodes read of an object ("object:NAME") or its instancer ("instancer:NAME")."""
+    result = {}
+    for wish in wanted:
+        kind, _, path = wish.partition(":")
+        owners = {"object": (subject, subject.data), "instancer": (parent, subject, subject.data)}.get(kind)
+        if owners and path:
+            result[wish] = property_color(owners, path) or (0.0, 0.0, 0.0, 0.0)
     return result
 
 

@@ -9,6 +9,7 @@ from luch.scene import Instances, Mesh, Object
 
 from .cache import MeshCache
 from .context import ExportContext
+from .derived import object_attributes
 from .lights import export_light
 from .materials import MaterialTable
 from .visibility import instance_visibility
@@ -141,6 +142,7 @@ class InstanceCollector:
                 shadow_catcher=subject.is_shadow_catcher,
                 lightgroup=subject.lightgroup or parent.lightgroup,
                 asset=asset_name(subject),
+                attributes=object_attributes(self._materials.attributes(slots), subject, parent),
             )
         )
         self._warn_about_what_is_missing(subject)

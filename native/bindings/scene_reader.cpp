@@ -160,6 +160,9 @@ struct Reader {
         in.lightgroup = lightgroup_index(lightgroups, py::cast<std::string>(object.attr("lightgroup")));
         in.crypto_object = crypto_id(py::cast<std::string>(object.attr("name")));
         in.crypto_asset = crypto_id(py::cast<std::string>(object.attr("asset")));
+        for (auto item : py::cast<py::dict>(object.attr("attributes"))) {
+            in.values.emplace_back(py::cast<std::string>(item.first), py::cast<std::array<float, 4>>(item.second));
+        }
         store.add_object(in);
     }
 

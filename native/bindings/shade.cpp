@@ -124,6 +124,7 @@ void load_scene(TestScene& scene, const py::dict& description) {
     scene.object.pass_index = float_of("object_index");
     scene.material.pass_index = float_of("material_index");
     for (int k = 0; k < 4; k++) scene.object.color[k] = 1.0f;
+    scene.object.first_attribute = NONE;
     if (description.contains("object_color")) {
         Floats color = py::cast<Floats>(description["object_color"]);
         if (color.size() != 4) throw py::value_error("object_color must have 4 components");

@@ -125,6 +125,12 @@ u32 SceneStore::add_object(const ObjectInput& input) {
     object.lightgroup = input.lightgroup;
     object.crypto_object = input.crypto_object;
     object.crypto_asset = input.crypto_asset;
+    object.first_attribute = NONE;
+    for (const auto& [name, value] : input.values) {
+        const AttributeView view{u32(attribute_data_.size()), 4, Domain::MESH};
+        attribute_data_.insert(attribute_data_.end(), value.begin(), value.end());
+        object_attributes_.push_back({u32(objects_.size()), attribute_id(name), view});
+    }
     objects_.push_back(object);
     object_inputs_.push_back(input);
     object_first_material_.push_back(u32(material_table_.size()));
@@ -178,6 +184,15 @@ void SceneStore::resolve_attributes() {
     attributes_.assign(meshes_.size() * count, AttributeView{0, 0, Domain::NONE_});
     for (size_t i = 0; i < meshes_.size(); i++) meshes_[i].first_attribute = u32(i * count);
     for (const NamedAttribute& named : named_attributes_) attributes_[named.mesh * count + named.id] = named.view;
+    // An object with values of its own has a row too.
+    for (const NamedAttribute& named : object_attributes_) {
+        u32& first = objects_[named.mesh].first_attribute;
+        if (first == NONE) {
+            first = u32(attributes_.size());
+            attributes_.resize(attributes_.size() + count, AttributeView{0, 0, Domain::NONE_});
+        }
+        attributes_[first + named.id] = named.view;
+    }
 }
 
 const SceneView& SceneStore::finish() {

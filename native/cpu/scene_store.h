@@ -1,7 +1,9 @@
 // Owns the arrays behind a SceneView. Filled mesh by mesh, program by program; then `finish`.
 #pragma once
+#include <array>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "cpu/shade/link.h"
@@ -40,6 +42,7 @@ struct ObjectInput {
     bool holdout, shadow_catcher;
     u32 lightgroup;
     float crypto_object, crypto_asset;
+    std::vector<std::pair<std::string, std::array<float, 4>>> values;  // attributes of the object itself
 };
 
 struct InstanceInput {
@@ -92,6 +95,7 @@ class SceneStore {
     std::vector<u16> material_slots_;
     std::vector<AttributeView> attributes_;
     std::vector<NamedAttribute> named_attributes_;
+    std::vector<NamedAttribute> object_attributes_;  // mesh: the object
     std::vector<MeshView> meshes_;
     std::vector<ObjectView> objects_;
     std::vector<ObjectInput> object_inputs_;

@@ -62,6 +62,8 @@ class Object:
     holdout: bool = False
     shadow_catcher: bool = False
     lightgroup: str = ""
+    # Values of the object itself that programs ask for as "object:NAME" or "instancer:NAME": red, green, blue, alpha.
+    attributes: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     asset: str = ""  # name for Cryptomatte Asset (the top of the parent chain)
 
 

@@ -352,6 +352,17 @@ def input_cases() -> dict[str, Case]:
     return cases
 
 
+def object_cases() -> dict[str, Case]:
+    """What only a whole scene knows: properties of objects."""
+    cases: dict[str, Case] = {}
+    for name in ("Color", "Vector", "Fac", "Alpha"):
+        for attribute in ("level", "hue", "pass_index", "color", "Nothing"):
+            cases[f"Attribute of the object {attribute} {name}"] = simple(
+                "ShaderNodeAttribute", name, attribute_name=attribute, attribute_type="OBJECT"
+            )
+    return cases
+
+
 def hill(tree: Tree) -> Any:
     """A height over UV, generated and object coordinates."""
     wave = new(tree, "ShaderNodeMath", operation="SINE")
@@ -428,6 +439,13 @@ def test_nodes_give_what_cycles_gives(family: Callable[[], dict[str, Case]], tmp
     # The renderer runs the same programs; its points lie a little apart, so that jumps and slopes show.
     apart = np.abs(tiles.drawn - tiles.cycles)[tiles.hit] / scale[tiles.hit]
     assert (apart.max(-1) < 0.02).mean() > 0.985
+
+
+def test_objects_give_their_properties(tmp_path: Path) -> None:
+    pictures = node_tiles.draw(object_cases(), tmp_path, mirrored=False, behind=False)
+    assert pictures["CYCLES"].max() == 7.0  # pass_index
+    apart = np.abs(pictures["LUCH"] - pictures["CYCLES"])
+    assert (apart.max(-1) < 1e-4).mean() > 0.985
 
 
 @pytest.mark.parametrize(("mirrored", "behind"), [(True, False), (False, True), (True, True)])

@@ -88,6 +88,7 @@ def build(cases: dict[str, Case], mirrored: bool = False) -> tuple[bpy.types.Sce
         tile = bpy.data.objects.new(name, mesh)
         tile.matrix_world = placement(index % side, index // side, mirrored)
         tile.pass_index, tile.color = 7, (0.2, 0.4, 0.6, 0.8)
+        tile["level"], tile["hue"] = 0.3, (0.2, 0.7, 0.9)
         scene.collection.objects.link(tile)
         material = bpy.data.materials.new(name)
         material.pass_index = 3

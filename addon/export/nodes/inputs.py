@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_UV, Vector, float_word
 
-from ..derived import ISLAND, POINTINESS
+from ..derived import ISLAND, POINTINESS, property_color
 from .tree import Compiler, Outputs, emitter
 
 # PathFlag of shade/point.h
@@ -130,36 +130,22 @@ def object_info(c: Compiler, node: bpy.types.Node) -> Outputs:
     }
 
 
-def _view_layer_value(c: Compiler, path: str) -> tuple[float, float, float, float]:
-    """A property of the view layer, else of the scene, as a colour; 0 where there is none."""
-    for owner in (c.context.view_layer, c.context.scene):
-        for spelled in (f'["{path}"]', path):  # custom properties first
-            try:
-                found = owner.path_resolve(spelled)
-            except (ValueError, TypeError):
-                continue
-            if isinstance(found, (int, float)):
-                return float(found), float(found), float(found), 1.0
-            numbers = [float(number) for number in found][:4] if hasattr(found, "__len__") else []
-            if len(numbers) in (3, 4):
-                return (*numbers, 1.0)[:4]  # type: ignore[return-value]
-    return 0.0, 0.0, 0.0, 0.0
-
-
 @emitter("ShaderNodeAttribute")
 def attribute(c: Compiler, node: bpy.types.Node) -> Outputs:
-    """Attribute of the geometry or of the view layer."""
-    b = c.builder
-    if node.attribute_type == "VIEW_LAYER":
-        red, green, blue, alpha = _view_layer_value(c, node.attribute_name)
+    """Attribute of the geometry, the object, the instancer or the view layer."""
+    b, kind, name = c.builder, node.attribute_type, node.attribute_name
+    if kind == "VIEW_LAYER":
+        red, green, blue, alpha = property_color((c.context.view_layer, c.context.scene), name) or (0.0, 0.0, 0.0, 0.0)
         color = b.vector(red, green, blue)
         mean = b.constant((red + green + blue) / 3.0)
         return {"Color": color, "Vector": color, "Fac": mean, "Alpha": b.constant(alpha)}
-    if node.attribute_type != "GEOMETRY":
-        c.warn(node, f"reads attributes of the {node.attribute_type.lower()}, which are not supported yet; 0 is used")
-        return {}
-    params = (*c.offset_params(), b.attribute(node.attribute_name))
-    x, y, z, factor, alpha_value = b.op("ATTRIBUTE_VALUE", (), params)
+    if kind == "GEOMETRY":
+        values = b.op("ATTRIBUTE_VALUE", (), (*c.offset_params(), b.attribute(name)))
+    else:
+        if kind == "INSTANCER":
+            c.warn(node, "reads the instancer object's properties only, not what geometry nodes store per instance")
+        values = b.op("ATTRIBUTE_OBJECT", (), (b.attribute(f"{kind.lower()}:{name}"),))
+    x, y, z, factor, alpha_value = values
     return {"Color": (x, y, z), "Vector": (x, y, z), "Fac": factor, "Alpha": alpha_value}
 
 

@@ -38,6 +38,7 @@ struct InstanceView {
 };
 
 struct ObjectView {
+    u32 first_attribute; // attributes[first_attribute + attribute id], 4 channels; NONE: no values of its own
     float pass_index;
     float color[4];
     Vec3 location;       // world

@@ -125,6 +125,25 @@ struct OpAttributeValue {
     }
 };
 
+// Attribute of the object: in and out as above.
+struct OpAttributeObject {
+    static constexpr int inputs = 0, outputs = 5, params = 1;
+    static constexpr bool reads_point = true;
+    LUCH_FN_SLOW static void eval(const OpContext& c, const u32* params, const float*, float* out) {
+        for (int k = 0; k < 5; k++) out[k] = k == 4 ? 1.0f : 0.0f;  // missing
+        const u32 instance = c.points->instance[c.lane];
+        if (instance == NONE) return;
+        const u32 first = c.scene->objects[c.scene->instances[instance].object].first_attribute;
+        if (first == NONE) return;
+        const AttributeView& view = c.scene->attributes[first + attribute_of(c, params[0])];
+        if (view.channels != 4) return;
+        const float* v = c.scene->attribute_data + view.offset;
+        store_vec3(out, load_vec3(v));
+        out[3] = (v[0] + v[1] + v[2]) * (1.0f / 3.0f);
+        out[4] = v[3];
+    }
+};
+
 // Color Attribute: as above, but a missing one is black and of alpha 0.
 struct OpAttributeColor {
     static constexpr int inputs = 0, outputs = 4, params = 3;
