@@ -233,12 +233,22 @@ def test_sun_below_the_horizon_gives_way_to_the_lamps() -> None:
     assert s["pdf"] == pytest.approx(1.0)
 
 
-def test_ten_thousand_identical_triangles_build_a_bounded_tree() -> None:
+def test_ten_thousand_nearly_identical_triangles_build_a_bounded_tree() -> None:
     triangle = [[0, 0, 1], [1, 0, 1], [0, 1, 1]]
-    lights = mesh_light(triangle, [[0, 1, 2]] * 10_000)
+    # Two units in the last place apart: all centres fall into one bin, yet no two lie in one place.
+    corners = [[x, y, z + 2.4e-7 * i] for i in range(10_000) for x, y, z in triangle]
+    lights = mesh_light(corners, [[3 * i, 3 * i + 1, 3 * i + 2] for i in range(10_000)])
     assert lights.counts()["emitters"] == 10_000
     assert lights.counts()["nodes"] < 2_000
     truth = 10_000 * polygon_irradiance(triangle, (0.2, 0.2, 0.0), UP)
+    assert irradiance(lights, (0.2, 0.2, 0.0), UP) == pytest.approx(truth, rel=0.01)
+
+
+def test_identical_triangles_are_one_light() -> None:
+    triangle = [[0, 0, 1], [1, 0, 1], [0, 1, 1]]
+    lights = mesh_light(triangle, [[0, 1, 2]] * 100 + [[2, 1, 0]] * 100)
+    assert lights.counts()["emitters"] == 1
+    truth = polygon_irradiance(triangle, (0.2, 0.2, 0.0), UP)
     assert irradiance(lights, (0.2, 0.2, 0.0), UP) == pytest.approx(truth, rel=0.01)
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import bpy  # first: it makes Blender's own modules importable
+
+# isort: split
 import addon_utils
-import bpy
 
 ZIP, PICTURE = Path(sys.argv[1]), Path(sys.argv[2])
 
