@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import importlib.util
 import subprocess
 import tempfile
@@ -15,8 +16,9 @@ import numpy.typing as npt
 HELPER = Path(__file__).with_name("embree_race.c")
 
 
+@functools.cache
 def load() -> ctypes.CDLL:
-    """The helper with the library behind it. Raises SystemExit that names what is missing."""
+    """Loaded once, so that no build is charged for it. The helper with the library behind it. Raises SystemExit that names what is missing."""
     spec = importlib.util.find_spec("embreex")
     if spec is None or not spec.submodule_search_locations:
         raise SystemExit("embreex is not installed; run `python3 build.py setup`.")
@@ -36,6 +38,11 @@ def load() -> ctypes.CDLL:
     return helper
 
 
+@functools.cache
+def _device(threads: int) -> ctypes.c_void_p:
+    return ctypes.c_void_p(load().embree_device(f"threads={threads}".encode()))
+
+
 class EmbreeAccel:
     """Looks like luch.Accel. quality: "default", "robust" (watertight), "high" (spatial splits)."""
 
@@ -44,11 +51,11 @@ class EmbreeAccel:
     ) -> None:
         self._helper = load()
         self._kept = (positions, triangles)  # shared with Embree
-        device = ctypes.c_void_p(self._helper.embree_device(f"threads={threads}".encode()))
+        before = int(self._helper.embree_bytes())
         self._scene = ctypes.c_void_p(self._helper.embree_build(
-            device, _pointer(positions), ctypes.c_size_t(len(positions)), _pointer(triangles),
+            _device(threads), _pointer(positions), ctypes.c_size_t(len(positions)), _pointer(triangles),
             ctypes.c_size_t(len(triangles)), int(quality == "robust"), int(quality == "high")))  # fmt: skip
-        self.bytes = int(self._helper.embree_bytes())
+        self.bytes = int(self._helper.embree_bytes()) - before
 
     def closest(self, rays: npt.NDArray[np.float32]) -> tuple[npt.NDArray[Any], ...]:
         """t, prim, u, v."""
