@@ -321,7 +321,6 @@ struct Reader {
         input.camera = cpu::make_camera_view(spec, frame, input.origin);
         input.frame_width = u32(frame.width);
         input.frame_height = u32(frame.height);
-        store.set_camera(input.camera.to_camera, transform_point(input.camera.to_world, {0.0f, 0.0f, 0.0f}));
     }
 
     void read_film(const py::object& film) {

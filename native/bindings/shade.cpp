@@ -227,8 +227,8 @@ py::dict run_program(const Words& code, const Floats& constants, u32 register_co
     py::array_t<float> values({size_t(register_count), count});
     py::array_t<float> emission({count, size_t(3)}), transparent({count, size_t(3)}), holdout(count);
     py::array_t<int> lobes(count);
-    std::vector<float> scratch(cpu::register_floats(program) + 16);
-    float* registers = reinterpret_cast<float*>((reinterpret_cast<size_t>(scratch.data()) + 63) & ~size_t(63));
+    cpu::Registers scratch(program);
+    float* registers = scratch.data();
     std::vector<ClosureSet> closures(SHADE_LANES);
     auto chunk = std::make_unique<ShadePoints>();
     for (size_t first = 0; first < count; first += SHADE_LANES) {

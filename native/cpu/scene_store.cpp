@@ -174,11 +174,6 @@ void SceneStore::add_image(const ImageView& image, std::vector<u8> pixels) {
     images_.back().pixels = pixels_.back().data();
 }
 
-void SceneStore::set_camera(const Affine& world_to_camera, Vec3 position) {
-    view_.world_to_camera = world_to_camera;
-    view_.camera_position = position;
-}
-
 void SceneStore::resolve_attributes() {
     size_t count = attribute_ids_.size();
     attributes_.assign(meshes_.size() * count, AttributeView{0, 0, Domain::NONE_});

@@ -67,7 +67,6 @@ class SceneStore {
     u32 add_material(const MaterialView& material);
     void add_image(const ImageView& image, std::vector<u8> pixels);
     void set_world_program(const Program& program) { view_.world_program = program; }
-    void set_camera(const Affine& world_to_camera, Vec3 position);
 
     // Points the view at the arrays; call after the last add_.
     const SceneView& finish();

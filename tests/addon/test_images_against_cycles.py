@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.textures import Case, Tree, assert_same_pixels, cycles_pixels, our_pixels, plane_scene
+from support.textures import Case, assert_same_pixels, cycles_of_cases, our_pixels
 
 F32 = NDArray[np.float32]
 WIDTH, HEIGHT = 9, 6
@@ -91,12 +91,7 @@ CASES = [*image_cases(), *environment_cases()]
 
 @pytest.fixture(scope="module")
 def cycles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, F32]:
-    plane = plane_scene()
-    tree = Tree("all")
-    tree.aov("position", tree.position)
-    for number, case in enumerate(CASES):
-        tree.aov(f"case {number}", tree.add(case))
-    return cycles_pixels(tree, plane, tmp_path_factory.mktemp("images"))
+    return cycles_of_cases(CASES, tmp_path_factory.mktemp("images"))
 
 
 @pytest.mark.parametrize("number", range(len(CASES)), ids=lambda k: CASES[k].name)

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.textures import Case, Tree, assert_same_pixels, cycles_pixels, our_pixels, plane_scene
+from support.textures import Case, assert_same_pixels, cycles_of_cases, our_pixels
 
 F32 = NDArray[np.float32]
 COLOR_1, COLOR_2, COLOR_3 = (0.8, 0.2, 0.1, 1.0), (0.1, 0.5, 0.9, 1.0), (0.3, 0.4, 0.05, 1.0)
@@ -172,12 +172,7 @@ CASES = [
 
 @pytest.fixture(scope="module")
 def cycles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, F32]:
-    plane = plane_scene()
-    tree = Tree("all")
-    tree.aov("position", tree.position)
-    for number, case in enumerate(CASES):
-        tree.aov(f"case {number}", tree.add(case))
-    return cycles_pixels(tree, plane, tmp_path_factory.mktemp("textures"))
+    return cycles_of_cases(CASES, tmp_path_factory.mktemp("textures"))
 
 
 @pytest.mark.parametrize("number", range(len(CASES)), ids=lambda k: CASES[k].name)

@@ -30,8 +30,8 @@ def slivers(width: float) -> Mesh:
     return separate(np.stack([a, b, c], 1))
 
 
-def icosphere(level: int) -> Mesh:
-    """A closed unit sphere of 20 * 4**level triangles."""
+def unit_icosphere(level: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and triangles of a closed unit sphere of 20 * 4**level triangles."""
     g = (1 + 5**0.5) / 2
     p = np.array([(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g), (0, -1, -g), (0, 1, -g),
                   (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)], float)  # fmt: skip
@@ -41,11 +41,17 @@ def icosphere(level: int) -> Mesh:
     p /= np.linalg.norm(p, axis=1, keepdims=True)
     for _ in range(level):
         edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
-        pairs, index = np.unique(edges, axis=0, return_inverse=True)
-        middle = p[pairs[:, 0]] + p[pairs[:, 1]]
+        key, index = np.unique(edges[:, 0] * len(p) + edges[:, 1], return_inverse=True)
+        middle = p[key // len(p)] + p[key % len(p)]
         a, b, c = len(p) + index.reshape(3, -1)
         t = np.concatenate([np.stack(f, 1) for f in ((t[:, 0], a, c), (t[:, 1], b, a), (t[:, 2], c, b), (a, b, c))])
         p = np.concatenate([p, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
+    return p, t
+
+
+def icosphere(level: int) -> Mesh:
+    """The same in single precision, as a ray tracer takes it."""
+    p, t = unit_icosphere(level)
     return p.astype(np.float32), t.astype(np.uint32)
 
 

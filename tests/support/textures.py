@@ -6,6 +6,7 @@ AOV of its own. Our side compiles a material per case and runs it at the positio
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -115,6 +116,16 @@ def cycles_pixels(tree: Tree, plane: bpy.types.Object, folder: Path) -> dict[str
     plane.data.materials.append(tree.material)
     passes = blender.render_passes("CYCLES", folder, width=SIZE, height=SIZE, samples=1)
     return {name: pixels.reshape(SIZE * SIZE, -1)[:, :3] for name, pixels in passes.items()}
+
+
+def cycles_of_cases(cases: Sequence[Case], folder: Path) -> dict[str, F32]:
+    """Cycles' pixels of "position" and of "case 0", "case 1", ...: one render shows them all, each as an AOV."""
+    plane = plane_scene()
+    tree = Tree("all")
+    tree.aov("position", tree.position)
+    for number, case in enumerate(cases):
+        tree.aov(f"case {number}", tree.add(case))
+    return cycles_pixels(tree, plane, folder)
 
 
 class Context:

@@ -3,14 +3,16 @@
 #include <algorithm>
 
 #include "cpu/integrator/scratch.h"
-#include "cpu/shade/interpreter.h"
 #include "luch/light/closest_lamp.h"
 #include "luch/light/sample.h"
 
 namespace luch::cpu {
 
 Batch::Batch(const RenderScene& scene, const FilmView& film)
-    : scene_(scene), writer_{film, 0}, scratch_(std::make_unique<Scratch>()) {
+    : scene_(scene),
+      writer_{film, 0},
+      scratch_(std::make_unique<Scratch>()),
+      registers_(scene.max_registers * SHADE_LANES) {
     paths_.resize(BATCH_PATHS);
     rays_.resize(BATCH_PATHS);
     next_rays_.resize(BATCH_PATHS);
@@ -20,16 +22,12 @@ Batch::Batch(const RenderScene& scene, const FilmView& film)
     hits_.resize(BATCH_PATHS);
     sorted_.resize(BATCH_PATHS);
     hit_material_.resize(BATCH_PATHS);
-    misses_.reserve(BATCH_PATHS);
     // A path casts one shadow ray and one for ambient occlusion at each point.
     shadow_rays_.resize(BATCH_PATHS * 2);
     shadows_.resize(BATCH_PATHS * 2);
     shadow_kind_.resize(BATCH_PATHS * 2);
     blocked_.resize(BATCH_PATHS * 2);
     material_first_.resize(scene.view.material_count + 1);
-    registers_.resize(scene.max_registers * SHADE_LANES + 16);
-    aligned_registers_ =
-        reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(registers_.data()) + 63) & ~uintptr_t(63));
     aovs_.resize(size_t(film.layout.aov_count) * 4 * SHADE_LANES);
 }
 
@@ -68,8 +66,7 @@ void Batch::generate(const PixelBlock& block) {
     for (int y = 0; y < block.height; y++) {
         for (int x = 0; x < block.width; x++) {
             u32 px = u32(block.x0 + x), py = u32(block.y0 + y);
-            film_count_samples(writer_, (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0), false,
-                               block.sample_count);
+            film_count_samples(writer_, film_pixel(px, py), false, block.sample_count);
             PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples);
             for (u32 s = 0; s < block.sample_count; s += CAMERA_LANES) {
                 u32 count = std::min(u32(CAMERA_LANES), block.sample_count - s);
@@ -106,7 +103,7 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
         path.flags = u32(PATH_CAMERA) | PATH_NO_MIS | PATH_THROUGH_FILM | (wants_features() ? u32(PATH_FEATURES) : 0u);
         path.visibility = RAY_CAMERA;
         path.dimension = DIMENSIONS_CAMERA;
-        path.pixel = (py - writer_.film.y0) * writer_.film.width + (px - writer_.film.x0);
+        path.pixel = film_pixel(px, py);
         path.mis_origin = camera.ray.origin;
         path.footprint = camera.footprint;
         path.spread = camera.spread;
@@ -131,17 +128,24 @@ void Batch::find_lamps() {
         for (u32 passed = 0; passed < scene_.limits.transparent + 1; passed++) {
             LampHit lamp = closest_lamp(scene_.view, ray, path.visibility);
             if (lamp.lamp == NONE) break;
-            float pdf = path.flags & PATH_NO_MIS ? 0.0f
-                                                 : pdf_lamp(scene_.view, path.mis_origin, path.mis_normal,
-                                                            path.flags & PATH_MIS_TRANSMITS, lamp, ray.direction);
-            Color light = eval_lamp(path, lamp, ray) * lamp.radiance;
-            u32 group = scene_.view.lights->lamps[lamp.lamp].lightgroup;
-            add_emission(path, light * mis_weight(path.mis_pdf, pdf), writer_.film.layout.emission, group);
+            add_lamp(path, lamp, ray);
             // Past this lamp: the next float after its distance.
             ray.t_min = bits_float(float_bits(max_f(lamp.t, 1e-30f)) + 1u);
             if (!(ray.t_min < ray.t_max)) break;
         }
     }
+}
+
+// Light of a lamp or sun that a path found by itself.
+void Batch::add_lamp(const PathState& path, const LampHit& hit, const Ray& ray) {
+    float pdf = 0.0f;
+    if (!(path.flags & PATH_NO_MIS)) {
+        pdf = pdf_lamp(scene_.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, hit,
+                       ray.direction);
+    }
+    Color light = eval_lamp(path, hit, ray) * hit.radiance;
+    add_emission(path, light * mis_weight(path.mis_pdf, pdf), writer_.film.layout.emission,
+                 scene_.view.lights->lamps[hit.lamp].lightgroup);
 }
 
 void Batch::shade_misses() {
@@ -170,15 +174,7 @@ void Batch::shade_misses() {
 void Batch::add_suns(const PathState& path, const Ray& ray) {
     for (u32 sun = 0; sun < scene_.view.lights->sun_count; sun++) {
         LampHit hit = sun_hit(scene_.view, sun, ray.direction, path.visibility);
-        if (hit.lamp == NONE) continue;
-        float pdf = 0.0f;
-        if (!(path.flags & PATH_NO_MIS)) {
-            pdf = pdf_lamp(scene_.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, hit,
-                           ray.direction);
-        }
-        Color light = eval_lamp(path, hit, ray) * hit.radiance;
-        add_emission(path, light * mis_weight(path.mis_pdf, pdf), writer_.film.layout.emission,
-                     scene_.view.lights->lamps[hit.lamp].lightgroup);
+        if (hit.lamp != NONE) add_lamp(path, hit, ray);
     }
 }
 
@@ -202,7 +198,7 @@ void Batch::add_world(const u32* queue, int count) {
             in.transparent_depth = path.transparent_bounce;
             setup_free_lane(in, -rays_[k].direction, points, i);
         }
-        run_program(scene_.view, scene_.view.world_program, points, scratch_->light_sets, aligned_registers_);
+        run_program(scene_.view, scene_.view.world_program, points, scratch_->light_sets, registers_.data());
         for (int i = 0; i < count; i++) radiance[i] = scratch_->light_sets[i].emission;
     }
     for (int i = 0; i < count; i++) {
@@ -282,6 +278,8 @@ void Batch::trace_shadows() {
         if (!is_zero(through)) add_direct(paths_[shadow.path], shadow, through);
     }
 }
+
+u32 Batch::film_pixel(u32 x, u32 y) const { return (y - writer_.film.y0) * writer_.film.width + (x - writer_.film.x0); }
 
 u32 Batch::depth_word(const PathState& path) const {
     auto byte = [](u32 n) { return n < 255u ? n : 255u; };

@@ -6,6 +6,7 @@
 
 #include "cpu/accel/accel.h"
 #include "cpu/integrator/render_scene.h"
+#include "cpu/shade/interpreter.h"
 #include "luch/film/film.h"
 #include "luch/integrator/path.h"
 #include "luch/light/light.h"
@@ -55,6 +56,7 @@ class Batch {
     void generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count);
     void traverse();
     void find_lamps();
+    void add_lamp(const PathState& path, const LampHit& hit, const Ray& ray);
     void shade_misses();
     void add_suns(const PathState& path, const Ray& ray);
     void add_world(const u32* queue, int count);
@@ -63,6 +65,7 @@ class Batch {
     bool survives(PathState& path, const MaterialView& material);
     void shade_hits();
     void trace_shadows();
+    u32 film_pixel(u32 x, u32 y) const;  // of a pixel of the full frame
     u32 depth_word(const PathState& path) const;
 
     // shade_surface.cpp: one chunk of points that share a material
@@ -116,7 +119,6 @@ class Batch {
     std::vector<Hit> hits_;
     std::vector<u32> sorted_;            // ray entries that hit something, grouped by material
     std::vector<u32> material_first_;    // counting sort
-    std::vector<u32> misses_;
     std::vector<u32> hit_material_;
     int shadow_count_ = 0;
     std::vector<Ray> shadow_rays_;
@@ -126,8 +128,7 @@ class Batch {
 
     struct Scratch;  // chunk-sized work space: points, closures, light samples
     std::unique_ptr<Scratch> scratch_;
-    std::vector<float> registers_;
-    float* aligned_registers_ = nullptr;
+    Registers registers_;
     std::vector<float> aovs_;
 };
 

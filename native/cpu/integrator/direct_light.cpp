@@ -1,7 +1,6 @@
 // Next-event estimation: one light per shaded point, its emission, and the shadow ray.
 #include "cpu/integrator/batch.h"
 #include "cpu/integrator/scratch.h"
-#include "cpu/shade/interpreter.h"
 #include "luch/bsdf/bsdf.h"
 #include "luch/geometry/surface.h"
 #include "luch/light/sample.h"
@@ -9,8 +8,8 @@
 namespace luch::cpu {
 namespace {
 
-// The shadow ray stops this fraction short of a sampled point, so that the light does not block itself: 8 ulp
-// of the distance beyond the error of the point itself.
+// The shadow ray stops this fraction short of a sampled point, so that the light does not block itself: 84 ulp
+// of the distance, where the point on the light and the ray to it are each off by a few.
 constexpr float LIGHT_SHORTENING = 1e-5f;
 
 Color only(BsdfValue& value, u32 visibility) {
@@ -18,10 +17,6 @@ Color only(BsdfValue& value, u32 visibility) {
     if (!(visibility & RAY_GLOSSY)) value.glossy = make_vec3(0.0f);
     if (!(visibility & RAY_TRANSMISSION)) value.transmission = make_vec3(0.0f);
     return total(value);
-}
-
-Color share(Color part, Color whole) {
-    return {safe_divide(part.x, whole.x), safe_divide(part.y, whole.y), safe_divide(part.z, whole.z)};
 }
 
 }  // namespace
@@ -58,12 +53,11 @@ void Batch::cast_shadow_ray(u32 k, int lane) {
     BsdfValue value = eval_closures(set, ng, lane_to_viewer(points, lane), s.direction, &bsdf_pdf);
     Color reflected = only(value, s.visibility);
     if (is_zero(reflected)) return;
-    float lobes = 0.0f;
-    for (int i = 0; i < set.count; i++) lobes += set.lobes[i].sample_weight;
+    float lobes = lobe_weight_sum(set);
     bsdf_pdf *= lobes / (lobes + average(set.transparent));
     float weight = (s.mis ? mis_weight(s.pdf_sa, bsdf_pdf) : 1.0f) / s.pdf_sa;
     Ray ray;
-    ray.origin = offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, ng, s.direction);
+    ray.origin = offset_origin(scratch_->spawn[lane], ng, s.direction);
     ray.t_min = 0.0f;
     ray.direction = s.direction;
     ray.t_max = s.distance;
@@ -118,7 +112,7 @@ void Batch::emission_of_samples(const u32* queue, const int* lanes, int count) {
         ShadePoints& points = scratch_->light_points;
         points.count = chosen_count;
         for (int i = 0; i < chosen_count; i++) setup_light_lane(queue[chosen[i]], chosen[i], points, i);
-        run_program(scene_.view, *program, points, scratch_->light_sets, aligned_registers_, nullptr, 0, Wanted::LIGHT);
+        run_program(scene_.view, *program, points, scratch_->light_sets, registers_.data(), nullptr, 0, Wanted::LIGHT);
         for (int i = 0; i < chosen_count; i++) scratch_->emission[chosen[i]] = scratch_->light_sets[i].emission;
     }
 }
@@ -178,7 +172,7 @@ Color Batch::eval_lamp(const PathState& path, const LampHit& hit, const Ray& ray
     in.transparent_depth = path.transparent_bounce;
     in.path = 0, in.seed = 0;
     setup_free_lane(in, hit.normal, points, 0);
-    run_program(scene_.view, lamp.program, points, scratch_->light_sets, aligned_registers_, nullptr, 0, Wanted::LIGHT);
+    run_program(scene_.view, lamp.program, points, scratch_->light_sets, registers_.data(), nullptr, 0, Wanted::LIGHT);
     return scratch_->light_sets[0].emission;
 }
 
@@ -210,11 +204,11 @@ Color Batch::walk_transparent(const Ray& shadow, const PathState& path) {
         in.transparent_depth = passed;
         in.path = 0, in.seed = 0;
         setup_surface_lane(scene_.view, in, points, 0);
-        run_program(scene_.view, material.program, points, scratch_->light_sets, aligned_registers_, nullptr, 0,
+        run_program(scene_.view, material.program, points, scratch_->light_sets, registers_.data(), nullptr, 0,
                     Wanted::LIGHT);
         through *= scratch_->light_sets[0].transparent;
         if (!(max_component(through) > 0.0f)) return make_vec3(0.0f);
-        Vec3 origin = offset_origin(spot.p, spot.error, lane_face_normal(points, 0), ray.direction);
+        Vec3 origin = offset_origin(spot, lane_face_normal(points, 0), ray.direction);
         if (finite_f(ray.t_max)) ray.t_max -= dot(origin - ray.origin, ray.direction);
         ray.origin = origin;
         if (!(ray.t_max > 0.0f)) return through;
@@ -231,8 +225,8 @@ void Batch::sample_ao(const PathState& path, u32 path_index, int lane) {
     make_frame(n, &t, &b);
     Vec3 direction = to_world(sample_cosine_hemisphere(u), t, b, n);
     Vec3 ng = lane_face_normal(points, lane);
-    shadow_rays_[shadow_count_] = {offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, ng, direction),
-                                   0.0f, direction, scene_.limits.ao_distance};
+    shadow_rays_[shadow_count_] = {offset_origin(scratch_->spawn[lane], ng, direction), 0.0f, direction,
+                                   scene_.limits.ao_distance};
     ShadowRay& shadow = shadows_[shadow_count_];
     shadow = ShadowRay{};
     shadow.contribution = path.throughput * (make_vec3(1.0f) - set.transparent);

@@ -33,7 +33,6 @@ struct RenderScene {
     size_t max_registers = 0;       // of any program
     double origin[3] = {0.0, 0.0, 0.0};  // of Scene.origin, for Position
     float mist_start = 0.0f, mist_inverse_depth = 0.0f, mist_exponent = 2.0f;
-    std::vector<u8> any_lobe;       // per material: 0 when its program has no surface closure at all
 };
 
 }  // namespace luch::cpu

@@ -25,12 +25,11 @@ u32 ceil_log2(u32 n) {
     return bits;
 }
 
-// One lane, evaluated for its emission; registers are the caller's.
+// One lane, evaluated for its emission.
 Color evaluate_emission(const SceneView& view, const Program& program, const ShadePoints& points) {
-    std::vector<float> registers(register_floats(program) + 16);
-    float* aligned = reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(registers.data()) + 63) & ~uintptr_t(63));
+    Registers registers(program);
     std::vector<ClosureSet> sets(1);
-    run_program(view, program, points, sets.data(), aligned);
+    run_program(view, program, points, sets.data(), registers.data());
     return sets[0].emission;
 }
 
@@ -106,9 +105,7 @@ std::vector<float> Renderer::world_map(int width, int height, const WorldSun& su
     std::vector<float> map(size_t(width) * size_t(height) * 3);
     const SceneView& view = scene_.view;
     pool_.parallel_for(size_t(height), 4, [&](size_t begin, size_t end, unsigned) {
-        std::vector<float> registers(register_floats(view.world_program) + 16);
-        float* aligned =
-            reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(registers.data()) + 63) & ~uintptr_t(63));
+        Registers registers(view.world_program);
         auto points = std::make_unique<ShadePoints>();
         std::vector<ClosureSet> sets(SHADE_LANES);
         for (size_t y = begin; y < end; y++) {
@@ -122,7 +119,7 @@ std::vector<float> Renderer::world_map(int width, int height, const WorldSun& su
                     in.flags = PATH_EMISSION_ONLY | PATH_DIFFUSE;
                     setup_free_lane(in, -in.point, *points, lane);
                 }
-                run_program(view, view.world_program, *points, sets.data(), aligned);
+                run_program(view, view.world_program, *points, sets.data(), registers.data());
                 for (int lane = 0; lane < points->count; lane++) {
                     float* out = map.data() + (y * size_t(width) + size_t(x0 + lane)) * 3;
                     out[0] = sets[lane].emission.x, out[1] = sets[lane].emission.y, out[2] = sets[lane].emission.z;

@@ -1,7 +1,6 @@
 // Shading of one chunk: up to SHADE_LANES hits that share a material.
 #include "cpu/integrator/batch.h"
 #include "cpu/integrator/scratch.h"
-#include "cpu/shade/interpreter.h"
 #include "luch/bsdf/bsdf.h"
 #include "luch/geometry/surface.h"
 #include "luch/light/sample.h"
@@ -16,7 +15,7 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
     setup_chunk(queue, count, points);
     float* aovs = aovs_.empty() ? nullptr : aovs_.data();
     if (aovs) std::fill(aovs_.begin(), aovs_.end(), 0.0f);
-    run_program(scene_.view, material.program, points, sets, aligned_registers_, aovs,
+    run_program(scene_.view, material.program, points, sets, registers_.data(), aovs,
                 size_t(writer_.film.layout.aov_count) * 4);
 
     int lit_count = 0;
@@ -144,16 +143,14 @@ void Batch::pass_through(PathState& path, u32 k, int lane, Color weight) {
     path.throughput *= weight;
     path.travelled += hits_[k].t;
     count_transparent(path, scene_.limits);
-    Vec3 origin = offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error,
-                                lane_face_normal(scratch_->points, lane), rays_[k].direction);
+    Vec3 origin = offset_origin(scratch_->spawn[lane], lane_face_normal(scratch_->points, lane), rays_[k].direction);
     push_ray(ray_path_[k], origin, rays_[k].direction);
 }
 
 void Batch::scatter(PathState& path, u32 k, int lane, Vec3 u) {
     const ShadePoints& points = scratch_->points;
     const ClosureSet& set = scratch_->sets[lane];
-    float through = average(set.transparent), lobes = 0.0f;
-    for (int i = 0; i < set.count; i++) lobes += set.lobes[i].sample_weight;
+    float through = average(set.transparent), lobes = lobe_weight_sum(set);
     if (!(through + lobes > 0.0f)) return;
     float u_lobe = u.z;
     float through_probability = through / (through + lobes);
@@ -181,8 +178,7 @@ void Batch::scatter(PathState& path, u32 k, int lane, Vec3 u) {
     bool see_through = s.transmitted && scene_.limits.film_transparent_glass && scene_.limits.film_transparent &&
                        s.roughness <= sqr(scene_.limits.film_transparent_roughness);
     count_bounce(path, scene_.limits, s, set_transmits(set), see_through);
-    push_ray(ray_path_[k], offset_origin(scratch_->spawn[lane].p, scratch_->spawn[lane].error, ng, s.direction),
-             s.direction);
+    push_ray(ray_path_[k], offset_origin(scratch_->spawn[lane], ng, s.direction), s.direction);
 }
 
 // The first bounce decides how its later light is shared among the light passes.
@@ -192,10 +188,8 @@ void Batch::choose_passes(PathState& path, const BsdfSample& s) {
     path.pass_glossy = make_vec3(s.lobe_class == CLASS_GLOSSY ? 1.0f : 0.0f);
     if (s.delta) return;
     Color sum = total(s.value);
-    path.pass_diffuse = {safe_divide(s.value.diffuse.x, sum.x), safe_divide(s.value.diffuse.y, sum.y),
-                         safe_divide(s.value.diffuse.z, sum.z)};
-    path.pass_glossy = {safe_divide(s.value.glossy.x, sum.x), safe_divide(s.value.glossy.y, sum.y),
-                        safe_divide(s.value.glossy.z, sum.z)};
+    path.pass_diffuse = share(s.value.diffuse, sum);
+    path.pass_glossy = share(s.value.glossy, sum);
 }
 
 }  // namespace luch::cpu

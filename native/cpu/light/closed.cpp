@@ -30,13 +30,13 @@ bool is_closed(const u32* triangles, u32 count) {
 }
 
 double six_volumes(const SceneView& scene, const MeshView& mesh, const u32* triangles) {
-    Vec3 origin = load_position(scene, mesh.first_vertex + triangles[0]);
+    Vec3 origin = vertex_at(scene, mesh, triangles[0]);
     double sum = 0.0;
     for (u32 t = 0; t < mesh.triangle_count; ++t) {
         const u32* index = triangles + 3 * static_cast<size_t>(t);
-        Vec3 a = load_position(scene, mesh.first_vertex + index[0]) - origin;
-        Vec3 b = load_position(scene, mesh.first_vertex + index[1]) - origin;
-        Vec3 c = load_position(scene, mesh.first_vertex + index[2]) - origin;
+        Vec3 a = vertex_at(scene, mesh, index[0]) - origin;
+        Vec3 b = vertex_at(scene, mesh, index[1]) - origin;
+        Vec3 c = vertex_at(scene, mesh, index[2]) - origin;
         sum += dot(a, cross(b, c));
     }
     return sum;

@@ -13,8 +13,7 @@ namespace luch::cpu {
 namespace {
 
 const MaterialView& material_of(const SceneView& scene, const InstanceView& at, u32 slot, u32* index) {
-    u32 last = at.material_count > 0u ? at.material_count - 1u : 0u;
-    *index = scene.material_table[at.first_material + std::min(slot, last)];
+    *index = material_of_slot(scene, at, slot);
     return scene.materials[*index];
 }
 
@@ -45,10 +44,9 @@ bool all_light(const SceneView& scene, const InstanceView& at) {
 bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, u32 sides, Color estimate, EmitterBounds* b) {
     const InstanceView& at = scene.instances[instance];
     const MeshView& mesh = scene.meshes[at.mesh];
-    const u32* index = scene.triangles + static_cast<u64>(mesh.first_triangle + prim) * 3u;
+    Triangle triangle = triangle_at(scene, mesh, prim);
     Vec3 corner[3];
-    for (int i = 0; i < 3; ++i)
-        corner[i] = transform_point(at.to_world, load_position(scene, mesh.first_vertex + index[i]));
+    for (int i = 0; i < 3; ++i) corner[i] = transform_point(at.to_world, triangle.p[i]);
     Vec3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     float double_area = length(normal);
     if (!(double_area > 0.0f && finite_f(double_area))) return false;
@@ -73,10 +71,8 @@ float cluster_weight(const SceneView& scene, const InstanceView& at, u32 prim, c
     u32 index;
     const MaterialView& material = material_of(scene, at, scene.material_slots[mesh.first_triangle + prim], &index);
     if (!samples_as_light(material) || (material.emission_sampling & sides) == 0u) return 0.0f;
-    const u32* corner = scene.triangles + static_cast<u64>(mesh.first_triangle + prim) * 3u;
-    Vec3 a = load_position(scene, mesh.first_vertex + corner[0]);
-    float area = 0.5f * length(cross(load_position(scene, mesh.first_vertex + corner[1]) - a,
-                                     load_position(scene, mesh.first_vertex + corner[2]) - a));
+    Triangle t = triangle_at(scene, mesh, prim);
+    float area = 0.5f * length(cross(t.p[1] - t.p[0], t.p[2] - t.p[0]));
     float strength = index < estimates.size() ? luminance(abs_v(estimates[index])) : 1.0f;
     float weight = area * (strength > 0.0f && finite_f(strength) ? strength : 1.0f);
     return finite_f(weight) ? weight : 0.0f;
@@ -144,10 +140,10 @@ class Collector {
     // their light twice.
     using Place = std::array<std::array<float, 3>, 3>;
     Place place_of(const InstanceView& at, const MeshView& mesh, u32 prim) const {
-        const u32* index = scene_.triangles + static_cast<u64>(mesh.first_triangle + prim) * 3u;
+        Triangle t = triangle_at(scene_, mesh, prim);
         Place place;
         for (int i = 0; i < 3; ++i) {
-            Vec3 p = transform_point(at.to_world, load_position(scene_, mesh.first_vertex + index[i]));
+            Vec3 p = transform_point(at.to_world, t.p[i]);
             place[static_cast<size_t>(i)] = {p.x, p.y, p.z};
         }
         std::sort(place.begin(), place.end());
@@ -173,7 +169,7 @@ class Collector {
             out_.cluster_cdf.push_back(sums.back() > 0.0 ? static_cast<float>(sum / sums.back()) : 0.0f);
         c.light = static_cast<float>(sums.back());
         for (u32 v = 0; v < mesh.vertex_count; ++v) {
-            Vec3 p = load_position(scene_, mesh.first_vertex + v);
+            Vec3 p = vertex_at(scene_, mesh, v);
             if (!finite_v(p)) continue;
             c.low = min_v(c.low, p);
             c.high = max_v(c.high, p);

@@ -1,6 +1,8 @@
 // Runs a shader program over a chunk of points: one operation at a time, each a loop over the lanes.
 #pragma once
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "luch/shade/scene_view.h"
 
@@ -24,6 +26,21 @@ enum class Wanted { ALL, LIGHT };
 
 // Floats that a program's registers need.
 inline size_t register_floats(const Program& program) { return size_t(program.register_count) * SHADE_LANES; }
+
+// Scratch for registers, aligned as the interpreter's loops want it.
+class Registers {
+ public:
+    explicit Registers(size_t floats) : memory_(floats + ALIGNMENT / sizeof(float)) {}
+    explicit Registers(const Program& program) : Registers(register_floats(program)) {}
+    float* data() {
+        auto start = reinterpret_cast<uintptr_t>(memory_.data());
+        return reinterpret_cast<float*>((start + ALIGNMENT - 1) & ~uintptr_t(ALIGNMENT - 1));
+    }
+
+ private:
+    static constexpr size_t ALIGNMENT = 64;  // bytes: a cache line, an AVX-512 register
+    std::vector<float> memory_;
+};
 
 // Runs the program for points[0, points.count). closures[points.count] are started empty and filled.
 // registers: scratch of register_floats(program) floats, 64-byte aligned. aovs: null, or

@@ -70,6 +70,13 @@ LUCH_FN LobeValue eval_lobe(const Lobe& lobe, Vec3 n_smooth, Vec3 wo, Vec3 wi) {
     return value;
 }
 
+// Of all lobes: what a lobe's sample_weight is a share of.
+LUCH_FN float lobe_weight_sum(const ClosureSet& set) {
+    float sum = 0.0f;
+    for (int i = 0; i < set.count; ++i) sum += set.lobes[i].sample_weight;
+    return sum;
+}
+
 // Light scattered from wi to wo per class, times |cos|; the density of sample_closures choosing wi.
 LUCH_FN_SLOW BsdfValue eval_closures(const ClosureSet& set, Vec3 /*n_geometric*/, Vec3 wo, Vec3 wi, float* pdf_sa) {
     BsdfValue value = {};
@@ -137,8 +144,7 @@ LUCH_FN int choose_lobe(const ClosureSet& set, float weight_sum, float* u) {
 LUCH_FN_SLOW BsdfSample sample_closures(const ClosureSet& set, Vec3 n_geometric, Vec3 wo, float u_lobe, Vec2 u) {
     BsdfSample out = {};
     if (set.count == 0) return out;
-    float weight_sum = 0.0f;
-    for (int i = 0; i < set.count; ++i) weight_sum += set.lobes[i].sample_weight;
+    float weight_sum = lobe_weight_sum(set);
     int chosen = set.count > 1 ? choose_lobe(set, weight_sum, &u_lobe) : 0;
     const Lobe& lobe = set.lobes[chosen];
     LobeSample s = sample_lobe(lobe, n_geometric, wo, u_lobe, u);

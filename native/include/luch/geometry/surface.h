@@ -38,14 +38,8 @@ LUCH_FN SurfacePoint triangle_point(Vec3 p0, Vec3 p1, Vec3 p2, float u, float v,
 
 LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit) {
     const InstanceView& instance = scene.instances[hit.instance];
-    const MeshView& mesh = scene.meshes[instance.mesh];
-    const u32* corner = scene.triangles + 3 * (u64(mesh.first_triangle) + hit.prim);
-    Vec3 p[3];
-    for (int k = 0; k < 3; ++k) {
-        const float* q = scene.positions + 3 * (u64(mesh.first_vertex) + corner[k]);
-        p[k] = {q[0], q[1], q[2]};
-    }
-    return triangle_point(p[0], p[1], p[2], hit.u, hit.v, instance.to_world, instance.to_object);
+    Triangle t = triangle_at(scene, scene.meshes[instance.mesh], hit.prim);
+    return triangle_point(t.p[0], t.p[1], t.p[2], hit.u, hit.v, instance.to_world, instance.to_object);
 }
 
 // Where a ray in `direction` leaves p: off the surface by its error bound, to the side that the direction
@@ -59,6 +53,10 @@ LUCH_FN Vec3 offset_origin(Vec3 p, Vec3 error, Vec3 n_geometric, Vec3 direction)
     return {offset.x > 0.0f ? next_up(q.x) : (offset.x < 0.0f ? next_down(q.x) : q.x),
             offset.y > 0.0f ? next_up(q.y) : (offset.y < 0.0f ? next_down(q.y) : q.y),
             offset.z > 0.0f ? next_up(q.z) : (offset.z < 0.0f ? next_down(q.z) : q.z)};
+}
+
+LUCH_FN Vec3 offset_origin(const SurfacePoint& point, Vec3 n_geometric, Vec3 direction) {
+    return offset_origin(point.p, point.error, n_geometric, direction);
 }
 
 }  // namespace luch

@@ -125,6 +125,11 @@ LUCH_FN void count_bounce(PathState& path, const PathLimits& limits, const BsdfS
     path.dimension += DIMENSIONS_PER_EVENT;
 }
 
+// Part of a whole, channel by channel; 0 of nothing.
+LUCH_FN Color share(Color part, Color whole) {
+    return {safe_divide(part.x, whole.x), safe_divide(part.y, whole.y), safe_divide(part.z, whole.z)};
+}
+
 // Scales a contribution whose brightness passes the limit; biased, off at 0.
 LUCH_FN Color clamp_contribution(Color c, float limit) {
     float sum = abs_f(c.x) + abs_f(c.y) + abs_f(c.z);

@@ -95,12 +95,41 @@ struct SceneView {
     u32 uv_attribute, color_attribute, generated_attribute, tangent_attribute;  // ids of the defaults
     Program world_program;
     u32 flags;                   // SceneFlag
-    Affine world_to_camera;      // Texture Coordinate > Camera/Window, Camera Data
-    Vec3 camera_position;
     const CameraView* camera;    // Texture Coordinate > Camera/Window, Camera Data; null: they give 0
     Vec2 frame_size;             // pixels of the full frame: Texture Coordinate > Window
     Vec3 origin;                 // Scene.origin: added to a position it gives Blender's world
 };
+
+// Row `row` of an array of vectors.
+LUCH_FN Vec3 vec3_row(const float* data, u64 row) { return {data[3 * row], data[3 * row + 1], data[3 * row + 2]}; }
+
+// Vertex `index` of the mesh, object space.
+LUCH_FN Vec3 vertex_at(const SceneView& scene, const MeshView& mesh, u32 index) {
+    return vec3_row(scene.positions, u64(mesh.first_vertex) + index);
+}
+
+// The triangle's three vertices, counted within its mesh.
+LUCH_FN const u32* corners_of(const SceneView& scene, const MeshView& mesh, u32 prim) {
+    return scene.triangles + 3 * (u64(mesh.first_triangle) + prim);
+}
+
+struct Triangle {
+    Vec3 p[3];  // object space
+};
+LUCH_FN Triangle triangle_at(const SceneView& scene, const MeshView& mesh, u32 prim) {
+    const u32* v = corners_of(scene, mesh, prim);
+    return {{vertex_at(scene, mesh, v[0]), vertex_at(scene, mesh, v[1]), vertex_at(scene, mesh, v[2])}};
+}
+
+// Material of a slot; a slot beyond the last one shows the last, as in Blender.
+LUCH_FN u32 material_of_slot(const SceneView& scene, const InstanceView& instance, u32 slot) {
+    u32 last = instance.material_count > 0u ? instance.material_count - 1u : 0u;
+    return scene.material_table[instance.first_material + (slot < last ? slot : last)];
+}
+LUCH_FN u32 material_at(const SceneView& scene, u32 instance_index, u32 prim) {
+    const InstanceView& instance = scene.instances[instance_index];
+    return material_of_slot(scene, instance, scene.material_slots[scene.meshes[instance.mesh].first_triangle + prim]);
+}
 
 LUCH_FN const float* table_of(const OpContext& c, u32 offset) {
     return c.scene->tables + c.program->first_table + offset;

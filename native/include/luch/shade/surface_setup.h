@@ -4,23 +4,9 @@
 
 namespace luch {
 
-struct TriangleCorners {
-    Vec3 p0, p1, p2;  // object space
-};
-
-LUCH_FN Vec3 load_vec3(const float* data, u32 index) {
-    return {data[index * 3], data[index * 3 + 1], data[index * 3 + 2]};
-}
-
-LUCH_FN TriangleCorners load_triangle(const SceneView& scene, const MeshView& mesh, u32 prim) {
-    const u32* t = scene.triangles + u64(mesh.first_triangle + prim) * 3;
-    return {load_vec3(scene.positions, mesh.first_vertex + t[0]), load_vec3(scene.positions, mesh.first_vertex + t[1]),
-            load_vec3(scene.positions, mesh.first_vertex + t[2])};
-}
-
 // Unit outward normal of the triangle in world space (zero area: an arbitrary unit vector).
-LUCH_FN Vec3 world_face_normal(const InstanceView& instance, const TriangleCorners& c) {
-    Vec3 n = normalize_or(cross(c.p1 - c.p0, c.p2 - c.p0), {0.0f, 0.0f, 1.0f});
+LUCH_FN Vec3 world_face_normal(const InstanceView& instance, const Triangle& t) {
+    Vec3 n = normalize_or(cross(t.p[1] - t.p[0], t.p[2] - t.p[0]), {0.0f, 0.0f, 1.0f});
     return normalize_or(transform_direction_transposed(instance.to_object, n), n);
 }
 
@@ -30,20 +16,12 @@ LUCH_FN Vec3 world_smooth_normal(const SceneView& scene, const MeshView& mesh, c
     if (mesh.normals_domain == Domain::NONE_) return face_normal;
     u32 i0 = prim * 3, i1 = i0 + 1, i2 = i0 + 2;
     if (mesh.normals_domain == Domain::POINT) {
-        const u32* t = scene.triangles + u64(mesh.first_triangle + prim) * 3;
+        const u32* t = corners_of(scene, mesh, prim);
         i0 = t[0], i1 = t[1], i2 = t[2];
     }
-    Vec3 n = load_vec3(scene.normals, mesh.first_normal + i0) * (1.0f - u - v) +
-             load_vec3(scene.normals, mesh.first_normal + i1) * u +
-             load_vec3(scene.normals, mesh.first_normal + i2) * v;
+    Vec3 n = vec3_row(scene.normals, mesh.first_normal + i0) * (1.0f - u - v) +
+             vec3_row(scene.normals, mesh.first_normal + i1) * u + vec3_row(scene.normals, mesh.first_normal + i2) * v;
     return normalize_or(transform_direction_transposed(instance.to_object, n), face_normal);
-}
-
-LUCH_FN u32 material_at(const SceneView& scene, u32 instance_index, u32 prim) {
-    const InstanceView& instance = scene.instances[instance_index];
-    u32 slot = scene.material_slots[scene.meshes[instance.mesh].first_triangle + prim];
-    u32 last = instance.material_count - 1;
-    return scene.material_table[instance.first_material + (slot < last ? slot : last)];
 }
 
 struct LaneInputs {
@@ -59,7 +37,7 @@ struct LaneInputs {
 LUCH_FN void setup_surface_lane(const SceneView& scene, const LaneInputs& in, ShadePoints& points, int lane) {
     const InstanceView& instance = scene.instances[in.instance];
     const MeshView& mesh = scene.meshes[instance.mesh];
-    Vec3 ng = world_face_normal(instance, load_triangle(scene, mesh, in.prim));
+    Vec3 ng = world_face_normal(instance, triangle_at(scene, mesh, in.prim));
     Vec3 n = world_smooth_normal(scene, mesh, instance, in.prim, in.u, in.v, ng);
     bool back = dot(ng, in.to_viewer) < 0.0f;
     if (back) {

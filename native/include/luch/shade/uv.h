@@ -11,7 +11,7 @@ LUCH_FN Vec3 surface_uv(const SceneView& scene, const ShadePoints& points, int l
     u32 prim = points.prim[lane];
     u32 row[3] = {prim * 3, prim * 3 + 1, prim * 3 + 2};
     if (map.domain == Domain::POINT) {
-        const u32* t = scene.triangles + u64(mesh.first_triangle + prim) * 3;
+        const u32* t = corners_of(scene, mesh, prim);
         for (int i = 0; i < 3; i++) row[i] = t[i];
     }
     const float weight[3] = {1.0f - points.u[lane] - points.v[lane], points.u[lane], points.v[lane]};

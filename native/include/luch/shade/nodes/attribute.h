@@ -30,20 +30,6 @@ LUCH_FN Vec3 stencil_offset(const OpContext& c, const u32* params) {
     return (params[0] == 1 ? s.dx : s.dy) * bits_float(params[1]);
 }
 
-struct Triangle {
-    Vec3 p[3];  // object space
-    u32 vertex[3];
-};
-LUCH_FN Vec3 vertex_at(const SceneView& scene, const MeshView& mesh, u32 index) {
-    const float* p = scene.positions + 3 * (u64(mesh.first_vertex) + index);
-    return {p[0], p[1], p[2]};
-}
-LUCH_FN Triangle triangle_at(const SceneView& scene, const MeshView& mesh, u32 prim) {
-    const u32* v = scene.triangles + 3 * (u64(mesh.first_triangle) + prim);
-    return {{vertex_at(scene, mesh, v[0]), vertex_at(scene, mesh, v[1]), vertex_at(scene, mesh, v[2])},
-            {v[0], v[1], v[2]}};
-}
-
 // Barycentrics of a corner of the stencil: solves p1 - p0, p2 - p0 against the step, in the plane
 // where the triangle looks largest.
 LUCH_FN Vec2 barycentric_step(Vec3 edge_u, Vec3 edge_v, Vec3 step, Vec3 n) {
@@ -95,7 +81,7 @@ LUCH_FN AttributeValue read_attribute(const OpContext& c, u32 attribute, const u
     }
     u32 index[3] = {3 * prim, 3 * prim + 1, 3 * prim + 2};
     if (view.domain == Domain::POINT) {
-        const u32* vertex = scene.triangles + 3 * (u64(mesh.first_triangle) + prim);
+        const u32* vertex = corners_of(scene, mesh, prim);
         for (int k = 0; k < 3; k++) index[k] = vertex[k];
     }
     Vec2 uv = barycentrics_at(c, params);

@@ -103,7 +103,7 @@ LUCH_FN Vec3 mesh_normal(const OpContext& c, const InstanceView& instance) {
     Vec3 flat = geometric_normal_at(c) * (back ? -1.0f : 1.0f);
     flat = normal_to_object(&instance, flat);
     if (mesh.normals_domain == Domain::NONE_) return flat;
-    const u32* vertex = scene.triangles + 3 * (u64(mesh.first_triangle) + prim);
+    const u32* vertex = corners_of(scene, mesh, prim);
     float u = c.points->u[c.lane], v = c.points->v[c.lane], weight[3] = {1.0f - u - v, u, v};
     Vec3 n = make_vec3(0.0f);
     for (u32 k = 0; k < 3; k++) {
