@@ -105,7 +105,7 @@ void Batch::write_data_passes(PathState& path, const ShadePoints& points, int la
         film_add(writer_, path.pixel, layout.transmission_color, albedo.transmission * path.throughput);
     }
     if (layout.mist != NONE) {
-        float mist = saturate_f((camera_distance(p) - scene_.mist_start) * scene_.mist_inverse_depth);
+        float mist = saturate_f((camera_distance(scene_.camera, p) - scene_.mist_start) * scene_.mist_inverse_depth);
         if (scene_.mist_exponent != 1.0f) mist = pow_f(mist, scene_.mist_exponent);
         film_add(writer_, path.pixel, layout.mist, (1.0f - mist) * average(path.throughput) * alpha);
     }
@@ -116,7 +116,7 @@ void Batch::write_data_passes(PathState& path, const ShadePoints& points, int la
 void Batch::write_first_sample(u32 pixel, Vec3 p, u32 instance, u32 material) {
     const ObjectView& object = scene_.view.objects[scene_.view.instances[instance].object];
     const FilmLayout& layout = writer_.film.layout;
-    film_set(writer_, pixel, layout.depth, camera_depth(p));
+    film_set(writer_, pixel, layout.depth, camera_depth(scene_.camera, p));
     film_set(writer_, pixel, layout.object_index, object.pass_index);
     film_set(writer_, pixel, layout.material_index, scene_.view.materials[material].pass_index);
     film_set_position(writer_, pixel, p);
@@ -130,13 +130,6 @@ void Batch::write_crypto(const PathState& path, u32 instance, u32 material, floa
     film_add_crypto(writer_, path.pixel, layout.crypto_material, scene_.view.materials[material].crypto, weight);
     film_add_crypto(writer_, path.pixel, layout.crypto_asset, object.crypto_asset, weight);
 }
-
-float Batch::camera_depth(Vec3 p) const {
-    if (scene_.camera.kind == CameraKind::EQUIRECTANGULAR) return camera_distance(p);
-    return transform_point(scene_.camera.to_camera, p).z;
-}
-
-float Batch::camera_distance(Vec3 p) const { return length(transform_point(scene_.camera.to_camera, p)); }
 
 // Albedo and normal (in camera space) for a denoiser; transparency and sharp reflections pass the task on
 // to what they show.

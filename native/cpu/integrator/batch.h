@@ -104,8 +104,6 @@ class Batch {
     void write_first_sample(u32 pixel, Vec3 p, u32 instance, u32 material);
     void write_crypto(const PathState& path, u32 instance, u32 material, float alpha);
     void write_features(PathState& path, const ClosureSet& set, Vec3 to_viewer);
-    float camera_depth(Vec3 p) const;
-    float camera_distance(Vec3 p) const;
 
     const RenderScene& scene_;
     FilmWriter writer_;
