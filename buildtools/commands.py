@@ -62,9 +62,10 @@ def _test_sanitized(arguments: Arguments) -> int:
     """tests/native with every memory access and every undefined operation watched."""
     ensure_environment()
     folder = compile_sanitized(arguments.jobs)
-    asan = output(["c++", "-print-file-name=libasan.so"])
+    # Python itself is not built with it; the C++ library must be there when it looks for what throws.
+    libraries = [output(["c++", f"-print-file-name={name}"]) for name in ("libasan.so", "libstdc++.so")]
     watched = {
-        "LD_PRELOAD": str(asan),  # Python itself is not built with it
+        "LD_PRELOAD": " ".join(str(library) for library in libraries),
         "ASAN_OPTIONS": "detect_leaks=0",  # Python's own, at exit
         "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1",
         "LUCH_ISA": "v3",

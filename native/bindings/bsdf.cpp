@@ -25,8 +25,8 @@ Vec3 vec3_of(const py::handle& value) {
 class Inputs {
  public:
     explicit Inputs(const py::dict& values) : values_(values) {}
-    ~Inputs() noexcept(false) {
-        if (std::uncaught_exceptions()) return;
+    // After the last read: throws std::invalid_argument that names an input which nobody asked for.
+    void refuse_unknown() const {
         for (auto [key, value] : values_)
             if (!known_.count(key.cast<std::string>()))
                 throw std::invalid_argument("closure has no input " + key.cast<std::string>());
@@ -225,6 +225,7 @@ Closures make_closures(const std::string& node, const py::dict& inputs, py::obje
     clear_closures(out.set);
     Inputs in(inputs);
     found->second(out.set, make_vec3(1.0f), in, out.context);
+    in.refuse_unknown();
     return out;
 }
 

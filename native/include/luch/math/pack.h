@@ -9,7 +9,11 @@ namespace luch {
 #if LUCH_CUDA
 #define LUCH_UNROLL _Pragma("unroll")
 #else
+#if defined(__SANITIZE_ADDRESS__)
+#define LUCH_UNROLL  // built with -O1, which removes some loops before it would unroll them and warns of the hint
+#else
 #define LUCH_UNROLL _Pragma("GCC unroll 32")
+#endif
 #if defined(__AVX512F__)
 inline constexpr int PACK_LANES = 16;
 #elif defined(__AVX2__)
