@@ -61,8 +61,7 @@ LUCH_FN u32 push_in_company(const Node8& node, u32 mask, f8 entry, u64** top_of_
     u64x8 child = __builtin_convertvector(load<u32x8>(node.child), u64x8);
     u64x8 entered = distance << 32 | child;
     alignas(64) u64 keys[8];
-    *reinterpret_cast<u64x8*>(keys) =
-        reinterpret_cast<u64x8>(_mm512_maskz_compress_epi64(__mmask8(mask), reinterpret_cast<__m512i>(entered)));
+    store(keys, _mm512_maskz_compress_epi64(__mmask8(mask), reinterpret_cast<__m512i>(entered)));
     u32 count = u32(__builtin_popcount(mask));
     u64 nearest = keys[0];
     if (count == 1) return u32(nearest);

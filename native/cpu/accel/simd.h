@@ -16,9 +16,16 @@ using f8 = float __attribute__((vector_size(32)));
 using d4 = double __attribute__((vector_size(32)));
 using i8v = int __attribute__((vector_size(32)));
 
+// Memory may hold any type (may_alias); it must be aligned for V.
 template <class V>
 LUCH_FN V load(const void* p) {
-    return *static_cast<const V*>(p);
+    using Aliasing __attribute__((may_alias)) = V;
+    return *static_cast<const Aliasing*>(p);
+}
+template <class V>
+LUCH_FN void store(void* p, V v) {
+    using Aliasing __attribute__((may_alias)) = V;
+    *static_cast<Aliasing*>(p) = v;
 }
 template <class V>
 LUCH_FN V splat(decltype(V{}[0] + V{}[0]) x) {

@@ -8,7 +8,7 @@ namespace {
 constexpr u32 CHUNK = 16384;           // primitives a thread takes at once
 constexpr float TRAVERSAL_COST = 1.0f;  // a node's visit, in tests of one block
 
-f8 load_box(const PrimBox& prim) { return *reinterpret_cast<const f8*>(&prim); }
+f8 load_box(const PrimBox& prim) { return load<f8>(&prim); }
 
 // (-2 c, 2 c) of the box's centre c; lanes 3 and 7 are junk.
 f8 centroid_corners(f8 box) {
@@ -192,8 +192,8 @@ void Splitter::partition(const PrimSet& set, const Split& split, PrimSet* left, 
     for (u32 i = set.begin; i < set.end; ++i) {
         f8 box = load_box(from[i]);
         int is_left = bin_of(box)[split.axis + 4] < split.bin;
-        *reinterpret_cast<f8*>(&to[l]) = box;
-        *reinterpret_cast<f8*>(&to[r]) = box;
+        store(&to[l], box);
+        store(&to[r], box);
         l += size_t(is_left);
         r -= size_t(1 - is_left);
         i8v mask = i8v{} - is_left;
@@ -227,7 +227,7 @@ void Splitter::partition_parallel(const PrimSet& set, const Split& split, PrimSe
         for (size_t i = set.begin + begin; i < set.begin + end; ++i) {
             f8 box = load_box(from[i]);
             int is_left = bin_of(box)[split.axis + 4] < split.bin;
-            *reinterpret_cast<f8*>(&to[next[is_left]++]) = box;
+            store(&to[next[is_left]++], box);
             bounds[is_left] = max_of(bounds[is_left], centroid_corners(box));
         }
         centroids[2 * c].set(bounds[1]);

@@ -11,8 +11,8 @@ namespace luch::cpu {
 struct alignas(32) Corners {
     float v[8] = {-INFINITE_DISTANCE, -INFINITE_DISTANCE, -INFINITE_DISTANCE, -INFINITE_DISTANCE,
                   -INFINITE_DISTANCE, -INFINITE_DISTANCE, -INFINITE_DISTANCE, -INFINITE_DISTANCE};
-    f8 get() const { return *reinterpret_cast<const f8*>(v); }
-    void set(f8 x) { *reinterpret_cast<f8*>(v) = x; }
+    f8 get() const { return load<f8>(v); }
+    void set(f8 x) { store(v, x); }
     void merge(const Corners& o) { set(max_of(get(), o.get())); }
     float extent(int axis) const { return v[axis] + v[axis + 4]; }
     float half_area() const {

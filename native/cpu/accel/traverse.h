@@ -23,8 +23,7 @@ struct alignas(16) LaneRay {
 LUCH_FN LaneRay lane_ray(const Ray& ray) {
     static_assert(sizeof(Ray) == sizeof(LaneRay));
     LaneRay out;
-    __builtin_memcpy(out.origin, &ray.origin, 16);
-    __builtin_memcpy(out.direction, &ray.direction, 16);
+    __builtin_memcpy(&out, &ray, sizeof(Ray));
     return out;
 }
 LUCH_FN f4 abs_of(f4 x) { return min_of(max_of(x, -x), splat<f4>(INFINITE_DISTANCE)); }
@@ -45,8 +44,8 @@ struct NodeRay {
         }
         f4 one = splat<f4>(1.0f);
         alignas(16) float near_r[4], far_r[4];
-        *reinterpret_cast<f4*>(near_r) = one / (steep + slope) * SLAB_DOWN;
-        *reinterpret_cast<f4*>(far_r) = one / (steep - slope) * SLAB_UP;
+        store(near_r, one / (steep + slope) * SLAB_DOWN);
+        store(far_r, one / (steep - slope) * SLAB_UP);
         for (u32 axis = 0; axis < 3; ++axis) {
             near_origin[axis] = far_origin[axis] = splat<f8>(o[axis]);
             near_rdir[axis] = splat<f8>(copysign_f(near_r[axis], d[axis]));
@@ -159,9 +158,9 @@ LUCH_FN u32 intersect_block(const Block4& block, const BlockRay& r, float t_max,
     d4 reciprocal = splat<d4>(1.0) / ((du + dv) + dw);
     d4 depth_sum = (du * dz[0] + dv * dz[1]) + dw * dz[2];
     f4 t = __builtin_convertvector((depth_sum * reciprocal) * splat<d4>(r.scale_z_exact), f4);
-    *reinterpret_cast<f4*>(hits->t) = t;
-    *reinterpret_cast<f4*>(hits->u) = __builtin_convertvector(dv * reciprocal, f4);
-    *reinterpret_cast<f4*>(hits->v) = __builtin_convertvector(dw * reciprocal, f4);
+    store(hits->t, t);
+    store(hits->u, __builtin_convertvector(dv * reciprocal, f4));
+    store(hits->v, __builtin_convertvector(dw * reciprocal, f4));
     return candidates & ~outside & mask_lt(splat<f4>(r.t_min), t) & mask_le(t, splat<f4>(t_max));
 }
 
@@ -190,7 +189,7 @@ LUCH_FN void keep_branch(u32& value) { asm volatile("" : "+r"(value)); }
 // Pushes all children of mask but the nearest, farthest first; returns the nearest.
 LUCH_FN u32 push_children(const Node8& node, u32 mask, f8 entry, u64** top_of_stack) {
     alignas(32) float distance[8];
-    *reinterpret_cast<f8*>(distance) = entry;
+    store(distance, entry);
     u32 nearest = 0;
     float nearest_distance = 0.0f;
     for_first_lane(mask, [&](u32 lane) {
