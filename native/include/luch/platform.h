@@ -33,6 +33,13 @@ inline constexpr float TWO_PI = 6.28318530717958647692f;
 inline constexpr float INFINITE_DISTANCE = __builtin_huge_valf();
 inline constexpr u32 NONE = 0xffffffffu;  // "no index" in every index field
 
+// Index of the lowest set bit; x must not be 0.
+#if LUCH_CUDA
+LUCH_FN int lowest_bit(u32 x) { return __ffs(static_cast<int>(x)) - 1; }
+#else
+LUCH_FN int lowest_bit(u32 x) { return __builtin_ctz(x); }
+#endif
+
 LUCH_FN u32 float_bits(float x) { return __builtin_bit_cast(u32, x); }
 LUCH_FN float bits_float(u32 x) { return __builtin_bit_cast(float, x); }
 

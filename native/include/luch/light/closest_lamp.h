@@ -67,7 +67,7 @@ LUCH_FN_SLOW LampHit closest_lamp(const SceneView& scene, const Ray& ray, u32 ra
         const LampBoxNode& node = lights.boxes[stack[--size]];
         u32 mask = hit_lamp_boxes(node, ray.origin, inverse, min_f(hit.t, ray.t_max));
         while (mask != 0u) {
-            int lane = __builtin_ctz(mask);
+            int lane = lowest_bit(mask);
             mask &= mask - 1u;
             u32 child = node.child[lane];
             if (child & BOX_IS_LAMP)
