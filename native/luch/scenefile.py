@@ -1,7 +1,8 @@
 """Scene files: one ``.luch`` holds one scene, in a zip of a JSON header and ``.npy`` arrays.
 
 The header mirrors the dataclasses of :mod:`luch.scene` field by field, so that a new field needs no change
-here: files written before it take its default. Nothing in a file is ever executed (no pickles).
+here: files written before it take its default. The operations of shader programs are stored with their names
+(:mod:`luch.operations`). Nothing in a file is ever executed (no pickles).
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from luch import scene as scene_module
-from luch.scene import Scene
+from luch.operations import Signature, renumber, signatures
+from luch.scene import Program, Scene
 
 FORMAT = "luch scene"
-# Raised when a file of the new kind would be misread by the old reader.
-VERSION = 1
+# Raised when a file of the new kind would be misread by the old reader, or one of the old kind by the new.
+VERSION = 2
+OLDEST = 2  # version 1 did not name the operations of its shader programs
 HEADER = "scene.json"
 
 
@@ -44,7 +47,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
         with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             encoder = _Encoder(archive)
             body = encoder.encode(scene, "Scene")
-            header = {"format": FORMAT, "version": VERSION, "scene": body}
+            header = {"format": FORMAT, "version": VERSION, "operations": signatures(), "scene": body}
             archive.writestr(HEADER, json.dumps(header, ensure_ascii=False, indent=1))
         os.replace(partial, target)
     finally:
@@ -58,7 +61,9 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
         with zipfile.ZipFile(path) as archive:
             header = json.loads(archive.read(HEADER))
             _check_header(header, name)
-            scene = _Decoder(archive).decode(header["scene"], Scene, "Scene")
+            decoder = _Decoder(archive)
+            scene = decoder.decode(header["scene"], Scene, "Scene")
+            _renumber(decoder.programs, header.get("operations"))
     except SceneFileError:
         raise
     except _Damage as damage:
@@ -79,6 +84,30 @@ def _check_header(header: Any, name: str) -> None:
         raise SceneFileError(
             f"{name}: written in version {version} of the format, this Luch reads up to {VERSION}. Update Luch."
         )
+    if version < OLDEST:
+        raise SceneFileError(
+            f"{name}: written in version {version} of the format, this Luch reads from {OLDEST} on. "
+            "Export the scene again."
+        )
+
+
+def _renumber(programs: list[Program], table: Any) -> None:
+    stored = [_signature(row, f"operations[{i}]") for i, row in enumerate(_expect(table, list, "operations"))]
+    if stored == signatures():
+        return
+    for program in programs:
+        try:
+            program.code = renumber(program.code, stored)
+        except ValueError as error:
+            raise _Damage(str(error)) from error
+
+
+def _signature(row: Any, where: str) -> Signature:
+    if len(_expect(row, list, where)) != 4:
+        raise _Damage(f"{where} has {len(row)} items, not 4")
+    name, inputs, outputs, params = row
+    counts = [_expect(count, int, where) for count in (inputs, outputs, params)]
+    return _expect(name, str, where), counts[0], counts[1], counts[2]
 
 
 class _Damage(ValueError):
@@ -127,6 +156,7 @@ class _Decoder:
     def __init__(self, archive: zipfile.ZipFile) -> None:
         self._archive = archive
         self._arrays: dict[str, NDArray[Any]] = {}
+        self.programs: list[Program] = []
 
     def decode(self, value: Any, hint: Any, where: str) -> Any:
         origin, arguments = typing.get_origin(hint), typing.get_args(hint)
@@ -170,9 +200,12 @@ class _Decoder:
             raise _Damage(f"{where} has a field {unknown[0]!r} that this version does not know")
         values = {name: self.decode(item, hints[name], f"{where}.{name}") for name, item in given.items()}
         try:
-            return kind(**values)
+            result = kind(**values)
         except TypeError as error:  # a field without default is missing
             raise _Damage(f"{where}: {error}") from error
+        if isinstance(result, Program):
+            self.programs.append(result)
+        return result
 
     def _load(self, value: Any, allowed: tuple[Any, ...], where: str) -> NDArray[Any]:
         member = _expect(_expect(value, dict, where).get("array"), str, where)

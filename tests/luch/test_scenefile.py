@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import zipfile
 from pathlib import Path
@@ -26,11 +27,14 @@ from luch.scene import (
     World,
 )
 from luch.scenefile import VERSION, SceneFileError, read_scene, write_scene
+from luch.shader import OPS, ProgramBuilder
+
+FIRST_OPERATION = min(OPS.values(), key=lambda op: op.code)
 
 
 def program() -> Program:
     return Program(
-        code=np.arange(12, dtype=np.uint32),
+        code=np.array([0, 0, *range(FIRST_OPERATION.inputs + FIRST_OPERATION.outputs)], np.uint32),
         constants=np.float32([0.1, np.inf, -0.0]),
         register_count=7,
         flags=3,
@@ -173,6 +177,15 @@ DAMAGES: dict[str, tuple[Any, str]] = {
     ),
     "true for a number": (lambda h, _: h["scene"]["settings"].update(samples=True), "samples holds bool, not int"),
     "tuple too short": (lambda h, _: h["scene"].update(origin=[1.0]), "Scene.origin has 1 items, not 3"),
+    "unnamed operations": (lambda h, _: h.pop("operations"), "operations holds NoneType, not list"),
+    "unknown operation": (
+        lambda h, _: h["operations"].__setitem__(0, ["POLISH", 1, 1, 0]),
+        "shader operation POLISH is not known",
+    ),
+    "changed operation": (
+        lambda h, _: h["operations"][0].__setitem__(1, 77),
+        "the shader operation .* has changed since",
+    ),
     "unknown field": (lambda h, _: h["scene"]["film"].update(taste="sweet"), "field 'taste'"),
     "missing field": (lambda h, _: h["scene"]["world"].pop("program"), "Scene.world.*program"),
 }
@@ -185,6 +198,45 @@ def test_damage_is_named_with_its_place(name: str, file: Path) -> None:
     with pytest.raises(SceneFileError, match=message) as caught:
         read_scene(file)
     assert str(file) in str(caught.value)
+
+
+def test_programs_mean_the_same_where_operations_have_other_numbers(tmp_path: Path) -> None:
+    builder = ProgramBuilder()
+    (facing,) = builder.op("POINT_BACKFACING")
+    (grey,) = builder.op("MATH_ADD", (facing, builder.constant(0.5)))
+    builder.closure("CLOSURE_EMISSION", (grey, grey, grey))
+    scene = full_scene()
+    scene.materials[0].surface = builder.finish()
+    scene.lights, scene.world = [], None  # other programs, of words that stay as they are
+    path = tmp_path / "scene.luch"
+    write_scene(scene, path)
+    expected = scene.materials[0].surface.code
+    with zipfile.ZipFile(path) as archive:
+        header = json.loads(archive.read("scene.json"))
+        member = header["scene"]["materials"][0]["surface"]["code"]["array"]
+
+    other = list(reversed(header["operations"]))
+    code, at = expected.copy(), 0
+    while at < len(code):
+        row = header["operations"][expected[at]]
+        code[at] = other.index(row)
+        at += 2 + row[1] + row[2] + int(expected[at + 1])
+    assert not np.array_equal(code, expected)
+    buffer = io.BytesIO()
+    np.save(buffer, code)
+
+    def elsewhere(h: Any, members: Any) -> None:
+        h["operations"] = other
+        members[member] = buffer.getvalue()
+
+    rewrite(path, elsewhere)
+    assert np.array_equal(read_scene(path).materials[0].surface.code, expected)
+
+
+def test_files_whose_operations_have_no_names_are_refused(file: Path) -> None:
+    rewrite(file, lambda h, _: h.update(version=1))
+    with pytest.raises(SceneFileError, match="version 1 of the format, this Luch reads from 2 on"):
+        read_scene(file)
 
 
 def test_other_files_are_refused(tmp_path: Path, file: Path) -> None:
@@ -207,8 +259,6 @@ def test_a_flipped_bit_is_found(file: Path) -> None:
 
 
 def test_pickles_are_never_executed(file: Path) -> None:
-    import io
-
     buffer = io.BytesIO()
     np.save(buffer, np.array([{"a": 1}], dtype=object), allow_pickle=True)
     rewrite(file, lambda h, m: m.update({"arrays/0.npy": buffer.getvalue()}))
