@@ -71,6 +71,7 @@ def _test_sanitized(arguments: Arguments) -> int:
         "LUCH_ISA": "v3",
     }
     command = [str(VENV_PYTHON), "-m", "pytest", "-o", f"pythonpath={folder} . tests", "-p", "no:cacheprovider"]
+    command.append("--capture=sys")  # what a sanitizer writes before it ends the process is seen
     return status([*command, "-m", "not long", "tests/native", *arguments.rest], extra=watched)
 
 

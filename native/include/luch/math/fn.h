@@ -167,9 +167,9 @@ LUCH_FN float exp_f(float x) {
 // x = 2^exponent * (1 + f), 1 + f in [sqrt(1/2), sqrt 2), for positive finite x.
 LUCH_FN float split_power_of_2(float x, float* f) {
     bool subnormal = x < 1.17549435e-38f;
-    i32 bits = static_cast<i32>(float_bits(subnormal ? x * 8388608.0f : x));
-    i32 exponent = (bits - 0x3f3504f3) >> 23;
-    *f = bits_float(static_cast<u32>(bits - exponent * 8388608)) - 1.0f;
+    u32 bits = float_bits(subnormal ? x * 8388608.0f : x);  // unsigned: negative x may wrap, log_special answers
+    i32 exponent = static_cast<i32>(bits - 0x3f3504f3u) >> 23;
+    *f = bits_float(bits - static_cast<u32>(exponent) * 8388608u) - 1.0f;
     return static_cast<float>(exponent - (subnormal ? 23 : 0));
 }
 
