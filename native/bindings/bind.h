@@ -16,6 +16,7 @@ void bind_render(py::module_& m);
 void bind_sampling(py::module_& m);
 void bind_shade(py::module_& m);
 void bind_sky(py::module_& m);
+void bind_structure(py::module_& m);
 void bind_textures(py::module_& m);
 
 }  // namespace luch::bindings

@@ -12,5 +12,6 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_sampling(m);
     luch::bindings::bind_shade(m);
     luch::bindings::bind_sky(m);
+    luch::bindings::bind_structure(m);
     luch::bindings::bind_textures(m);
 }

@@ -6,7 +6,7 @@ t is in their units. Whatever the structure, the hit is the smallest t and, on e
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,67 +15,121 @@ from luch._native import core
 
 Float32s = npt.NDArray[np.float32]
 Int32s = npt.NDArray[np.int32]
-KINDS = ("BVH", "BRUTE_FORCE")
+Kind = Literal[
+    "BVH", "BVH2", "BVH2_STACKLESS", "CWBVH", "KD_TREE", "HIERARCHICAL_GRID", "GRID", "BRUTE_FORCE",
+]  # fmt: skip
+Precision = Literal["FAST", "WATERTIGHT", "DOUBLE"]
+Quality = Literal["FAST", "NORMAL", "HIGH"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+PRECISIONS: tuple[Precision, ...] = get_args(Precision)
+QUALITIES: tuple[Quality, ...] = get_args(Quality)
+# StructureKind of cpu/accel/structure.h
+_STRUCTURES = ("BRUTE_FORCE", "GRID", "HIERARCHICAL_GRID", "BVH2", "BVH2_STACKLESS", "KD_TREE", "CWBVH")
 _ALL_KINDS = np.zeros(0, np.uint32)  # no mask: every ray sees everything
 
 
 class Accel:
-    """Triangles that rays can be traced through.
+    """Triangles and spheres that rays can be traced through.
 
-    positions: (V, 3) float32. triangles: (T, 3) uint32 vertex indices. kind: "BVH", the eight-wide tree, or
-    "BRUTE_FORCE", every triangle in turn: the oracle, and for tiny meshes. threads: 0 is all processors.
-    may_be_transparent: (T,) bool, for `blocked`. Triangles with a vertex that is not finite, or with an index
-    outside the mesh, are dropped and counted in `stats`. Raises ValueError on wrong shapes or types.
+    positions: (V, 3) float32. triangles: (T, 3) uint32 vertex indices. spheres: (S, 4) float32, centre and radius;
+    sphere k is primitive T + k. kind: the structure; "BVH" is the eight-wide tree, "BRUTE_FORCE" every primitive in
+    turn: the oracle, and for tiny meshes. precision: "FAST" (single precision), "WATERTIGHT" (no ray slips between
+    two triangles that share an edge) or "DOUBLE". quality of the build: "FAST", "NORMAL" or "HIGH".
+    may_be_transparent: (T + S,) bool, for `blocked`. threads: 0 is all processors. Primitives with a number that is
+    not finite, with an index outside the mesh or of no radius are dropped and counted in `stats`. Raises ValueError
+    on wrong shapes or types.
     """
 
     def __init__(
         self,
         positions: npt.ArrayLike,
         triangles: npt.ArrayLike,
-        kind: Literal["BVH", "BRUTE_FORCE"] = "BVH",
-        threads: int = 0,
+        kind: Kind = "BVH",
+        precision: Precision = "WATERTIGHT",
+        spheres: npt.ArrayLike | None = None,
         may_be_transparent: npt.ArrayLike | None = None,
+        quality: Quality = "NORMAL",
+        threads: int = 0,
     ) -> None:
-        if kind not in KINDS:
-            raise ValueError(f"kind is {kind!r}; it must be one of {', '.join(KINDS)}.")
+        _one_of(kind, KINDS, "kind")
+        _one_of(precision, PRECISIONS, "precision")
+        _one_of(quality, QUALITIES, "quality")
         if not 0 <= threads <= 1024:
             raise ValueError(f"threads is {threads}; it must lie in 0 (all processors) to 1024.")
         points = _rows(positions, 3, np.float32, "positions")
         corners = _rows(triangles, 3, np.uint32, "triangles")
+        balls = _rows(np.zeros((0, 4)) if spheres is None else spheres, 4, np.float32, "spheres")
+        count = len(corners) + len(balls)
+        if count >= 2**31 - 1:
+            raise ValueError(f"{count} primitives; one structure holds fewer than 2147483647.")
         flags = np.zeros(0, np.uint8)
         if may_be_transparent is not None:
             flags = np.ascontiguousarray(may_be_transparent, dtype=bool).astype(np.uint8)
-            if flags.shape != (len(corners),):
-                raise ValueError(f"may_be_transparent has shape {flags.shape}; it must be ({len(corners)},).")
-        mesh = np.array([[0, len(points), 0, len(corners)]], np.uint32)
-        here = np.eye(3, 4, dtype=np.float32).reshape(1, 12)
-        self._core = core.ArrayAccel(
-            points, corners, flags, mesh, np.zeros(1, np.uint32), here, here, np.full(1, 63, np.uint32),
-            kind == "BRUTE_FORCE", threads, 0)  # fmt: skip
+            if flags.shape != (count,):
+                raise ValueError(f"may_be_transparent has shape {flags.shape}; it must be ({count},).")
+        self.kind, self.precision = kind, precision
+        self._precision = PRECISIONS.index(precision)
+        self._wide: Any = None
+        self._structure: Any = None
+        if kind == "BVH" and precision == "WATERTIGHT" and not len(balls):
+            mesh = np.array([[0, len(points), 0, len(corners)]], np.uint32)
+            here = np.eye(3, 4, dtype=np.float32).reshape(1, 12)
+            self._wide = core.ArrayAccel(
+                points, corners, flags, mesh, np.zeros(1, np.uint32), here, here, np.full(1, 63, np.uint32),
+                False, threads, 0)  # fmt: skip
+        elif kind == "BVH":
+            raise ValueError(f"kind BVH has no {'spheres' if len(balls) else precision} yet; BVH2 has.")
+        else:
+            number, detail = _STRUCTURES.index(kind), QUALITIES.index(quality)
+            self._structure = core.ArrayStructure(points, corners, balls, flags, number, detail, threads)
 
     def closest(self, rays: npt.ArrayLike) -> tuple[Float32s, Int32s, Float32s, Float32s]:
         """Closest hit of each ray. rays: (N, 8) float32.
 
-        Returns t (inf on a miss), triangle index (-1 on a miss), and the barycentrics u, v:
-        point = (1 - u - v) p0 + u p1 + v p2; each (N,). A ray that is not finite or has no direction misses.
+        Returns t (inf on a miss), primitive index (-1 on a miss), and the barycentrics u, v:
+        point = (1 - u - v) p0 + u p1 + v p2; each (N,). Spheres have u = v = 0. A ray that is not finite or has no
+        direction misses.
         """
-        t, prim, u, v, _ = self._core.closest(_rows(rays, 8, np.float32, "rays"), _ALL_KINDS)
+        given = _rows(rays, 8, np.float32, "rays")
+        if self._structure is not None:
+            t, prim, u, v, _ = self._structure.closest(given, self._precision, False)
+        else:
+            t, prim, u, v, _ = self._wide.closest(given, _ALL_KINDS)
         return t, prim, u, v
 
     def blocked(self, rays: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-        """What lies in each ray's interval: 0 nothing, 1 an opaque triangle, 2 only ones that may be transparent."""
-        result: npt.NDArray[np.uint8] = self._core.any(_rows(rays, 8, np.float32, "rays"), _ALL_KINDS)
+        """What lies in each ray's interval: 0 nothing, 1 something opaque, 2 only what may be transparent."""
+        given = _rows(rays, 8, np.float32, "rays")
+        if self._structure is not None:
+            result: npt.NDArray[np.uint8] = self._structure.any(given, self._precision, False)[0]
+        else:
+            result = self._wide.any(given, _ALL_KINDS)
         return result
 
     def any(self, rays: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Whether each ray hits anything. rays: (N, 8) float32; returns (N,) bool."""
         return np.asarray(self.blocked(rays) != 0, np.bool_)
 
+    def count(self, rays: npt.ArrayLike, any_hit: bool = False) -> dict[str, int]:
+        """The work of tracing these rays, all together: nodes, boxes (or planes), primitives tested, bytes read."""
+        given = _rows(rays, 8, np.float32, "rays")
+        if self._structure is None:
+            raise ValueError("kind BVH does not count its work; the other kinds do.")
+        trace = self._structure.any if any_hit else self._structure.closest
+        counts: dict[str, int] = trace(given, self._precision, True)[-1]
+        return counts
+
     @property
     def stats(self) -> dict[str, float]:
-        """Counts of the structure: triangles, nodes, leaf_blocks, bytes, dropped_triangles, build_seconds."""
-        result: dict[str, float] = self._core.stats()
+        """Counts of the structure: its primitives (triangles), nodes, bytes, and how many primitives were dropped."""
+        source = self._structure if self._structure is not None else self._wide
+        result: dict[str, float] = source.stats()
         return result
+
+
+def _one_of(given: str, names: tuple[str, ...], what: str) -> None:
+    if given not in names:
+        raise ValueError(f"{what} is {given!r}; it must be one of {', '.join(names)}.")
 
 
 def _rows(array: npt.ArrayLike, width: int, dtype: type[np.generic], name: str) -> npt.NDArray[np.generic]:

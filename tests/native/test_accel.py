@@ -229,7 +229,7 @@ def test_blocked_tells_opaque_from_maybe_transparent() -> None:
         ({"triangles": np.zeros((1, 4), np.uint32)}, r"triangles has shape \(1, 4\)"),
         ({"triangles": np.zeros((1, 3), np.float32)}, "triangles holds float32"),
         ({"triangles": np.array([[0, 1, -1]])}, "index outside"),
-        ({"kind": "KD_TREE"}, "kind is 'KD_TREE'"),
+        ({"kind": "OCTREE"}, "kind is 'OCTREE'"),
         ({"threads": -1}, "threads is -1"),
         ({"may_be_transparent": [True, False]}, r"may_be_transparent has shape \(2,\)"),
     ],

@@ -96,7 +96,7 @@ class TwoLevel final : public Accel {
     void closest_in_entry(const Entry& entry, const Ray& ray, Hit* hit) const;
     u8 any_in_entry(const Entry& entry, const Ray& ray) const;
     Hit closest_one(const Ray& ray, u32 kinds) const;
-    Hit world_hit(const Group& group, const GroupHit& hit) const;
+    Hit world_hit(const Group& group, const RefHit& hit) const;
     void closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const;
     u8 any_one(const Ray& ray, u32 kinds) const;
 
@@ -246,7 +246,7 @@ void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) c
     LaneRay inside;
     if (!enter(entry, ray, &inside)) return;
     const Group& group = groups_[entry.group];
-    GroupHit hit = {best->t, NONE, 0.0f, 0.0f};
+    RefHit hit = {best->t, NONE, 0.0f, 0.0f};
     closest_in_group(group, inside, max_f(ray.t_min, 0.0f), &hit);
     if (hit.ref == NONE) return;
     const Member& member = group.member_of(hit.ref);
@@ -293,7 +293,7 @@ u8 TwoLevel::any_one(const Ray& ray, u32 kinds) const {
     return result;
 }
 
-Hit TwoLevel::world_hit(const Group& group, const GroupHit& hit) const {
+Hit TwoLevel::world_hit(const Group& group, const RefHit& hit) const {
     if (hit.ref == NONE) return MISS;
     const Member& member = group.member_of(hit.ref);
     return {hit.t, hit.ref - member.first_ref, member.instance, hit.u, hit.v};
@@ -302,7 +302,7 @@ Hit TwoLevel::world_hit(const Group& group, const GroupHit& hit) const {
 // All is one group in the world: its rays can be interleaved.
 void TwoLevel::closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const {
     const Group& group = groups_[entries_[0].group];
-    GroupHit found[BATCH];
+    RefHit found[BATCH];
     u32 valid[BATCH] = {}, valid_count = 0;
     for (u32 i = 0; i < count; ++i) {
         found[i] = {min_f(rays[i].t_max, LARGEST), NONE, 0.0f, 0.0f};

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cpu/thread_pool.h"
-#include "luch/geometry/ray.h"
+#include "luch/accel/primitives.h"
 #include "luch/shade/scene_view.h"
 
 namespace luch::cpu {
@@ -25,12 +25,10 @@ enum class AccelKind { BVH, BRUTE_FORCE };
 // together stay below this: rays through one tree are about twice as fast as through two levels. 65 bytes and
 // 0.4 microseconds of building a triangle.
 constexpr u64 FLATTEN_TRIANGLES = 2'000'000;
-enum TriangleFlag : u8 { TRIANGLE_MAY_BE_TRANSPARENT = 1 };
-enum Blocked : u8 { BLOCKED_NOT = 0, BLOCKED_OPAQUE = 1, BLOCKED_MAYBE = 2 };
 
 class Accel {
  public:
-    // triangle_flags: per mesh, per triangle TriangleFlag bits; empty, or an empty list: all opaque.
+    // triangle_flags: per mesh, per triangle PrimitiveFlag bits; empty, or an empty list: all opaque.
     // The scene's arrays are copied: the view may go away afterwards, the instances too.
     static std::unique_ptr<Accel> build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
                                         ThreadPool& pool, AccelKind kind = AccelKind::BVH,

@@ -43,7 +43,7 @@ class Gather {
     u32 flagged(u32 ref, const Member& member) const {
         if (flags_.empty() || flags_[member.mesh].empty()) return ref;
         u8 flag = flags_[member.mesh][ref - member.first_ref];
-        return flag & TRIANGLE_MAY_BE_TRANSPARENT ? ref | REF_TRANSPARENT : ref;
+        return flag & PRIMITIVE_MAY_BE_TRANSPARENT ? ref | REF_TRANSPARENT : ref;
     }
 
  private:

@@ -32,7 +32,7 @@ void for_each_hit(const Group& group, const TriangleRay& ray, float t_min, float
 
 }  // namespace
 
-void closest_in_group(const Group& group, const LaneRay& ray, float t_min, GroupHit* best) {
+void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* best) {
     if (group.nodes.size() == 0) {
         for_each_hit(group, make_triangle_ray(ray.origin3(), ray.direction3()), t_min, best->t,
                      [&](const TriangleHit& hit, u32 ref) { offer(hit.t, ref, hit.u, hit.v, best); });

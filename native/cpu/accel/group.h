@@ -6,6 +6,7 @@
 
 #include "cpu/accel/bvh8.h"
 #include "cpu/thread_pool.h"
+#include "luch/accel/primitives.h"
 #include "luch/shade/scene_view.h"
 
 namespace luch::cpu {
@@ -18,12 +19,6 @@ struct Member {
     u32 first_ref;
 };
 
-struct GroupHit {
-    float t;
-    u32 ref;  // NONE: nothing yet; a hit at exactly t then still counts
-    float u, v;
-};
-
 struct Group {
     std::vector<Member> members;  // by instance
     HugeArray<Node8> nodes;       // none: a list of blocks, tested one by one (brute force)
@@ -34,12 +29,12 @@ struct Group {
     const Member& member_of(u32 ref) const;
 };
 
-// Fills everything but members, which say what to gather. flags: per mesh, per triangle TriangleFlag.
+// Fills everything but members, which say what to gather. flags: per mesh, per triangle PrimitiveFlag.
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags, bool with_tree,
                  ThreadPool& pool);
 
 // The ray in the group's space, valid, 0 <= t_min; hit->t its upper end.
-void closest_in_group(const Group& group, const LaneRay& ray, float t_min, GroupHit* hit);
+void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* hit);
 // A Blocked value.
 u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max);
 

@@ -103,7 +103,7 @@ LUCH_FN bool pop(Flight& flight, float t_max) {
 }
 
 // One node or one leaf of one ray; false when the ray is done.
-LUCH_FN bool step(const Group& group, Flight& flight, GroupHit* best) {
+LUCH_FN bool step(const Group& group, Flight& flight, RefHit* best) {
     if (flight.current & LEAF) {
         closest_in_leaf(group, flight.block, flight.current, best);
         return pop(flight, best->t);
@@ -118,7 +118,7 @@ LUCH_FN bool step(const Group& group, Flight& flight, GroupHit* best) {
 
 }  // namespace
 
-void closest_interleaved(const Group& group, const Ray* rays, const u32* indices, size_t count, GroupHit* hits) {
+void closest_interleaved(const Group& group, const Ray* rays, const u32* indices, size_t count, RefHit* hits) {
     FlightSpace space[IN_FLIGHT];
     Flight* flights[IN_FLIGHT];
     u32 active = 0;

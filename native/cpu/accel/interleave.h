@@ -11,7 +11,7 @@
 namespace luch::cpu {
 
 // Rays indices[0..count) of rays, all valid. hits[i] belongs to ray i; hits[i].t is its upper end.
-void closest_interleaved(const Group& group, const Ray* rays, const u32* indices, size_t count, GroupHit* hits);
+void closest_interleaved(const Group& group, const Ray* rays, const u32* indices, size_t count, RefHit* hits);
 
 // Whether a ray mostly starts far from the one before it, measured by the size of the scene.
 bool rays_are_scattered(const Ray* rays, size_t count, const Box& scene);

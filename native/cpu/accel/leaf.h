@@ -6,8 +6,7 @@
 
 namespace luch::cpu {
 
-LUCH_FN bool is_closer(float t, u32 ref, const GroupHit& best) { return t < best.t || (t == best.t && ref < best.ref); }
-LUCH_FN void offer(float t, u32 ref, float u, float v, GroupHit* best) {
+LUCH_FN void offer(float t, u32 ref, float u, float v, RefHit* best) {
     if (is_closer(t, ref & REF_MASK, *best)) *best = {t, ref & REF_MASK, u, v};
 }
 LUCH_FN void note_blocked(u32 ref, u8* result) {
@@ -17,7 +16,7 @@ LUCH_FN void note_blocked(u32 ref, u8* result) {
         *result = BLOCKED_MAYBE;
 }
 
-LUCH_FN void closest_in_leaf(const Group& group, const BlockRay& ray, u32 leaf, GroupHit* best) {
+LUCH_FN void closest_in_leaf(const Group& group, const BlockRay& ray, u32 leaf, RefHit* best) {
     u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
     for (u32 b = first; b < end; ++b) {
         const Block4& block = group.blocks[b];

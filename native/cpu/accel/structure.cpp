@@ -1,0 +1,16 @@
+#include "cpu/accel/structure.h"
+
+#include <stdexcept>
+
+namespace luch::cpu {
+
+std::unique_ptr<Structure> build_structure(StructureKind kind, const StructureInput& input, ThreadPool& pool) {
+    switch (kind) {
+        case StructureKind::BRUTE_FORCE:
+            return build_brute_force(input, pool);
+        default:
+            throw std::invalid_argument("This structure is not in this build.");
+    }
+}
+
+}  // namespace luch::cpu
