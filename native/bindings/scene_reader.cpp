@@ -281,6 +281,7 @@ struct Reader {
         Program program = read_program(world.attr("program"), py::cast<std::string>(world.attr("name")));
         store.set_world_program(program);
         input.world.visibility = py::cast<u32>(world.attr("visibility"));
+        input.world.max_bounces = py::cast<u32>(world.attr("max_bounces"));
         input.world.lightgroup = lightgroup_index(lightgroups, py::cast<std::string>(world.attr("lightgroup")));
         std::string sampling = py::cast<std::string>(world.attr("sampling"));
         input.world_map_width = sampling == "NONE"     ? 0

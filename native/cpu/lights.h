@@ -42,6 +42,7 @@ struct WorldInput {
     int map_width = 0, map_height = 0;
     const float* map_rgb = nullptr;
     u32 visibility = RAY_ALL, lightgroup = 0;
+    u32 max_bounces = 1024;
     // A sun that the map cannot resolve (Sky Texture): direction to it, angular diameter, its mean radiance.
     bool has_sun = false;
     Vec3 sun_direction{0.0f, 0.0f, 1.0f};

@@ -153,3 +153,24 @@ def test_many_lamps_of_all_kinds_light_as_in_cycles(scene: bpy.types.Scene, rend
         place = (2.2 * math.cos(angle), 2.2 * math.sin(angle), 1.5)
         add_lamp(scene, lamp | {"energy": lamp["energy"] * 0.1}, location=place)
     assert_alike(render("LUCH", samples=128), render("CYCLES", samples=128), mean=8e-3, tile=0.04)
+
+
+@pytest.mark.parametrize("bounces", [0, 1])
+@pytest.mark.parametrize("kind", ["lamp", "world"])
+def test_light_of_few_bounces_ends_as_in_cycles(
+    scene: bpy.types.Scene, render: Render, kind: str, bounces: int
+) -> None:
+    stage(scene)
+    scene.cycles.max_bounces = 4
+    if kind == "lamp":
+        lamp: Any = add_lamp(scene, LAMPS["soft point"]).data
+        settings = lamp.cycles
+    else:
+        scene.world = bpy.data.worlds.new("World")
+        settings = scene.world.cycles
+    endless = render("LUCH", samples=64)[..., :3].mean()
+    settings.max_bounces = bounces
+    ours = render("LUCH", samples=128)
+    assert_alike(ours, render("CYCLES", samples=128), mean=8e-3, tile=0.04)
+    if kind == "lamp":  # paths that leave the scene still see the world
+        assert ours[..., :3].mean() < (0.9995 if bounces else 0.99) * endless

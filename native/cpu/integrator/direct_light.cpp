@@ -19,6 +19,12 @@ Color only(BsdfValue& value, u32 visibility) {
     return total(value);
 }
 
+// Blender's Max Bounces of a lamp or of the world, as Cycles hears it: it ends sampling, not seeing.
+bool light_is_spent(const LightsView& lights, const LightSample& s, u32 bounce) {
+    if (s.kind == EmitterKind::LAMP) return bounce > lights.lamps[s.lamp].max_bounces;
+    return s.kind == EmitterKind::WORLD && bounce > lights.world.max_bounces;
+}
+
 }  // namespace
 
 void Batch::sample_lights(const u32* queue, int lit_count) {
@@ -34,6 +40,7 @@ void Batch::sample_lights(const u32* queue, int lit_count) {
                                      set_transmits(set), u.z, {u.x, u.y});
         const LightSample& s = samples[lane];
         if (s.kind == EmitterKind::NONE_ || !(s.pdf_sa > 0.0f)) continue;
+        if (light_is_spent(*scene_.view.lights, s, paths_[ray_path_[queue[lane]]].bounce)) continue;
         wanted[wanted_count++] = lane;
     }
     if (wanted_count == 0) return;

@@ -88,6 +88,7 @@ WorldLight build_world(const WorldInput& in, WorldArrays* arrays) {
     w.constant = in.constant || in.map_rgb == nullptr || in.map_width < 1 || in.map_height < 1;
     w.visibility = in.visibility;
     w.lightgroup = in.lightgroup;
+    w.max_bounces = in.max_bounces;
     if (!in.present) return w;
     w.radiance = finite_v(in.constant_radiance) ? in.constant_radiance : Color{0.0f, 0.0f, 0.0f};
     double mean = usable_luminance(w.radiance), rise = 0.0;

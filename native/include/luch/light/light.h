@@ -74,7 +74,7 @@ struct LampView {
     Program program;
     float random;
     u32 visibility, lightgroup;
-    u32 max_bounces;
+    u32 max_bounces;            // points after more bounces do not sample it; paths that hit it still see it
     u32 emitter;                // index into LightsView::emitters; of a sun: into suns; NONE: gives no light
 };
 
@@ -100,6 +100,7 @@ struct WorldLight {
     const float* column_cdf;    // (height + 1) * (width + 1)
     float irradiance;           // that sampling is for, luminance; 0: never sampled
     u32 visibility, lightgroup;
+    u32 max_bounces;            // points after more bounces do not sample it
     bool has_sun;               // an extra cone around the sun of a sky texture
     Vec3 sun_direction;
     float sun_one_minus_cos;
