@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from support.accel_meshes import unit_icosphere
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -25,6 +24,25 @@ class RayScene:
     target: tuple[float, float, float]
     light: tuple[float, float, float]
     fov_tangent: float  # half the picture's width at distance 1
+
+
+def unit_icosphere(level: int) -> Part:
+    """Vertices and triangles of a closed unit sphere of 20 * 4**level triangles."""
+    g = (1 + 5**0.5) / 2
+    p = np.array([(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g), (0, -1, -g), (0, 1, -g),
+                  (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)], float)  # fmt: skip
+    t = np.array([(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2),
+                  (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5),
+                  (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)])  # fmt: skip
+    p /= np.linalg.norm(p, axis=1, keepdims=True)
+    for _ in range(level):
+        edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
+        key, index = np.unique(edges[:, 0] * len(p) + edges[:, 1], return_inverse=True)
+        middle = p[key // len(p)] + p[key % len(p)]
+        a, b, c = len(p) + index.reshape(3, -1)
+        t = np.concatenate([np.stack(f, 1) for f in ((t[:, 0], a, c), (t[:, 1], b, a), (t[:, 2], c, b), (a, b, c))])
+        p = np.concatenate([p, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
+    return p, t
 
 
 def join(parts: list[Part]) -> Part:
