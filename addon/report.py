@@ -86,6 +86,8 @@ def is_watched() -> bool:
 
 def progress_line(progress: Any) -> str:
     """For the status line: "Sample 32/128 | Remaining 00:14 | 312 MiB"."""
+    if progress.preparing:
+        return "Building structures and lights"
     parts = [f"Sample {progress.samples}/{progress.total_samples}"]
     if math.isfinite(progress.remaining_seconds):
         parts.append(f"Remaining {clock(progress.remaining_seconds)}")

@@ -11,13 +11,17 @@ class PyRenderer {
     explicit PyRenderer(const py::object& scene) {
         ReadScene read = read_scene(scene);
         dropped_instances_ = read.dropped_instances;
-        py::gil_scoped_release release;
         renderer_ = std::make_unique<cpu::Renderer>(std::move(read.store), read.input);
     }
 
     bool render(u32 first, u32 count) {
         py::gil_scoped_release release;
         return renderer_->render(first, count);
+    }
+
+    bool prepare() {
+        py::gil_scoped_release release;
+        return renderer_->prepare();
     }
 
     void cancel() { renderer_->cancel(); }
@@ -56,7 +60,8 @@ void bind_render(py::module_& m) {
     auto render = m.def_submodule("render", "Rendering of a luch.scene.Scene on the CPU.");
     py::class_<PyRenderer>(render, "Renderer")
         .def(py::init<const py::object&>(), py::arg("scene"),
-             "Builds structures and lights. Raises ValueError, naming the object, for data that does not fit together.")
+             "Reads the scene. Raises ValueError, naming the object, for data that does not fit together.")
+        .def("prepare", &PyRenderer::prepare, "Builds structures and lights, once, first of all. False when cancelled.")
         .def("render", &PyRenderer::render, py::arg("first"), py::arg("count"),
              "Traces samples [first, first + count) of every pixel. False when cancelled.")
         .def("cancel", &PyRenderer::cancel, "Callable from any thread.")

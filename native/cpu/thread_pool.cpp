@@ -40,12 +40,13 @@ struct ThreadPool::Shared {
     std::atomic<size_t> next{0};
     std::exception_ptr error;
 
-    void work(unsigned worker) {
+    void work(unsigned worker, const ThreadPool& pool) {
         current_worker = static_cast<int>(worker);
         for (;;) {
             size_t begin = next.fetch_add(grain, std::memory_order_relaxed);
             if (begin >= count) break;
             try {
+                pool.check_cancelled();
                 chunk(context, begin, std::min(begin + grain, count), worker);
             } catch (...) {
                 std::lock_guard lock(mutex);
@@ -56,7 +57,7 @@ struct ThreadPool::Shared {
         current_worker = -1;
     }
 
-    void loop(unsigned worker) {
+    void loop(unsigned worker, const ThreadPool& pool) {
         u64 seen = 0;
         for (;;) {
             {
@@ -67,7 +68,7 @@ struct ThreadPool::Shared {
                 if (!open) continue;  // woken too late: the others have done it all
                 ++running;
             }
-            work(worker);
+            work(worker, pool);
             std::lock_guard lock(mutex);
             if (--running == 0) finished.notify_one();
         }
@@ -77,7 +78,7 @@ struct ThreadPool::Shared {
 ThreadPool::ThreadPool(unsigned threads)
     : shared_(std::make_unique<Shared>()), size_(threads ? threads : available_processors()) {
     for (unsigned worker = 1; worker < size_; ++worker)
-        shared_->threads.emplace_back([s = shared_.get(), worker] { s->loop(worker); });
+        shared_->threads.emplace_back([this, worker] { shared_->loop(worker, *this); });
 }
 
 ThreadPool::~ThreadPool() {
@@ -92,8 +93,10 @@ ThreadPool::~ThreadPool() {
 void ThreadPool::run(size_t count, size_t grain, Chunk chunk, void* context) {
     if (count == 0) return;
     if (current_worker >= 0) {  // inside a body: this worker alone, chunk by chunk
-        for (size_t begin = 0; begin < count; begin += grain)
+        for (size_t begin = 0; begin < count; begin += grain) {
+            check_cancelled();
             chunk(context, begin, std::min(begin + grain, count), static_cast<unsigned>(current_worker));
+        }
         return;
     }
     Shared& s = *shared_;
@@ -111,7 +114,7 @@ void ThreadPool::run(size_t count, size_t grain, Chunk chunk, void* context) {
         ++s.job;
     }
     if (!alone) s.start.notify_all();
-    s.work(0);
+    s.work(0, *this);
     if (!alone) {
         std::unique_lock lock(s.mutex);
         s.open = false;

@@ -2,6 +2,7 @@
 // grain alone, never on the number of threads or on timing: a body that writes only what belongs to
 // its own indices gives the same bits with any number of threads.
 #pragma once
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <type_traits>
@@ -9,6 +10,9 @@
 #include "luch/platform.h"
 
 namespace luch::cpu {
+
+// Thrown out of work that its pool was told to give up.
+struct Cancelled {};
 
 class ThreadPool {
  public:
@@ -19,6 +23,13 @@ class ThreadPool {
     ThreadPool& operator=(const ThreadPool&) = delete;
 
     unsigned size() const { return size_; }
+
+    // From any thread: running and later parallel_fors end with Cancelled before their next chunk.
+    void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+    // For long loops within a chunk.
+    void check_cancelled() const {
+        if (cancelled_.load(std::memory_order_relaxed)) throw Cancelled();
+    }
 
     // Calls body(begin, end, worker) for the chunks [0, grain), [grain, 2 grain), ... of [0, count),
     // in any order, worker in [0, size()): an index for scratch memory. Returns when all are done.
@@ -42,6 +53,7 @@ class ThreadPool {
     struct Shared;
     std::unique_ptr<Shared> shared_;
     unsigned size_;
+    std::atomic<bool> cancelled_{false};
 };
 
 }  // namespace luch::cpu

@@ -160,8 +160,14 @@ class _Line:
         if not self._on or now < self._next:
             return
         self._next = now + 0.25
+        if progress.preparing:
+            self._write("building structures and lights")
+            return
         left = f", {progress.remaining_seconds:.0f} s left" if np.isfinite(progress.remaining_seconds) else ""
-        text = f"{progress.fraction:6.1%}  {progress.samples} of {progress.total_samples} samples{left}"
+        self._write(f"{progress.fraction:6.1%}  {progress.samples} of {progress.total_samples} samples{left}")
+
+    @staticmethod
+    def _write(text: str) -> None:
         print(f"\r{text:70}", end="", file=sys.stderr, flush=True)
 
 

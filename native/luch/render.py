@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ class Progress:
     memory_bytes: int  # of the process, at its peak
     new_picture: bool  # a step has ended since the last call: passes() shows more than before
     passes: Callable[[], dict[str, F32]]
+    preparing: bool = False  # structures and lights are being built; no sample was traced yet
 
 
 @dataclass
@@ -48,24 +50,52 @@ class Result:
     cancelled: bool = False
 
 
+def _preparing(total: int, start: float) -> Progress:
+    seconds = time.perf_counter() - start
+    return Progress(0, total, 0.0, seconds, float("inf"), peak_memory_bytes(), False, dict, preparing=True)
+
+
 def peak_memory_bytes() -> int:
     """Most memory that this process has held."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-class _Step(threading.Thread):
+class _Work(threading.Thread):
     """One call of the native renderer, so that the caller's thread can watch and cancel."""
 
-    def __init__(self, renderer: Any, first: int, count: int) -> None:
+    def __init__(self, work: Callable[[], object]) -> None:
         super().__init__(daemon=True)
-        self._renderer, self._first, self._count = renderer, first, count
+        self._work = work
         self.error: BaseException | None = None
 
     def run(self) -> None:
         try:
-            self._renderer.render(self._first, self._count)
+            self._work()
         except BaseException as error:  # handed to the caller's thread, which raises it
             self.error = error
+
+
+def _watched(work: Callable[[], object], renderer: Any, goes_on: Callable[[], bool]) -> bool:
+    """Does `work` on a thread of its own and asks `goes_on` meanwhile; on the first no, cancels the renderer.
+
+    Returns whether it ran to its end uncancelled. No thread outlives this call.
+    """
+    thread = _Work(work)
+    asked_to_go_on = True
+    thread.start()
+    try:
+        while thread.is_alive():
+            thread.join(WATCH_SECONDS)
+            if thread.is_alive() and asked_to_go_on and not goes_on():
+                asked_to_go_on = False
+                renderer.cancel()
+    except BaseException:  # Ctrl-C, or the caller's own
+        renderer.cancel()
+        thread.join()
+        raise
+    if thread.error is not None:
+        raise thread.error
+    return asked_to_go_on
 
 
 def _next_count(done: int, total: int, seconds: float) -> int:
@@ -85,10 +115,11 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     """
     start = time.perf_counter()
     renderer = core.render.Renderer(scene)
-    prepared = time.perf_counter()
     settings = scene.settings
     total = max(1, settings.samples)
-    done, cancelled = 0, False
+    cancelled = not _watched(renderer.prepare, renderer, lambda: progress is None or progress(_preparing(total, start)))
+    prepared = time.perf_counter()
+    done = 0
 
     def tell(first: int, count: int, new_picture: bool) -> bool:
         if progress is None:
@@ -118,23 +149,14 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     timed_out = False
     while done < total and not cancelled and not timed_out:
         count = _next_count(done, total, time.perf_counter() - prepared)
-        step = _Step(renderer, done, count)
-        step.start()
-        try:
-            while step.is_alive():
-                step.join(WATCH_SECONDS)
-                if not step.is_alive() or cancelled or timed_out:
-                    continue
-                timed_out = out_of_time() and done > 0
-                cancelled = not tell(done, count, False)
-                if cancelled or timed_out:
-                    renderer.cancel()
-        except BaseException:  # Ctrl-C, or the caller's own: no thread may outlive the renderer
-            renderer.cancel()
-            step.join()
-            raise
-        if step.error is not None:
-            raise step.error
+
+        def goes_on(first: int = done, count: int = count) -> bool:
+            nonlocal cancelled, timed_out
+            timed_out = out_of_time() and first > 0
+            cancelled = not tell(first, count, False)
+            return not (cancelled or timed_out)
+
+        _watched(partial(renderer.render, done, count), renderer, goes_on)
         if not cancelled and not timed_out:
             done += count
             timed_out = out_of_time()

@@ -36,7 +36,9 @@ class FakeRenderer:
     def render(self, scene: Scene, *, progress: Callable[[Any], bool] | None = None) -> FakeResult:
         self.scenes.append(scene)
         self.during()
-        told = types.SimpleNamespace(fraction=0.5, samples=1, total_samples=2, remaining_seconds=np.inf)
+        told = types.SimpleNamespace(
+            fraction=0.5, samples=1, total_samples=2, remaining_seconds=np.inf, preparing=False
+        )
         goes_on = progress is None or progress(told)
         pixels = np.full((scene.film.height, scene.film.width, 4), 0.5, np.float32)
         stats = {"samples": scene.settings.samples, "render_seconds": 0.5, "bytes": 2**40, "notes": ["a"]}

@@ -79,6 +79,7 @@ void Splitter::fill(Bins& bins, const PrimBox* prims, u32 begin, u32 end, const 
 }
 
 Split Splitter::find(const PrimSet& set, bool halve, bool parallel) {
+    pool_.check_cancelled();
     Split split;
     split.halve = true;
     if (halve) return split;

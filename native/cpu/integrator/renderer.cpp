@@ -36,7 +36,18 @@ Color evaluate_emission(const SceneView& view, const Program& program, const Sha
 }  // namespace
 
 Renderer::Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input)
-    : input_(input), store_(std::move(store)), pool_(input.threads), film_(input.film) {
+    : input_(input), store_(std::move(store)), pool_(input.threads), film_(input.film) {}
+
+bool Renderer::prepare() {
+    try {
+        build_all();
+    } catch (const Cancelled&) {
+        return false;
+    }
+    return !cancelled_.load();
+}
+
+void Renderer::build_all() {
     scene_.view = store_->finish();
     double start = seconds_now();
     accel_ = Accel::build(scene_.view, store_->transparency_flags(), pool_, input_.accel_kind);
@@ -178,7 +189,7 @@ bool Renderer::render(u32 first, u32 count) {
     tiles_total_ = u64(columns) * u64(rows);
     tiles_done_.store(0);
     double start = seconds_now();
-    pool_.parallel_for(size_t(tiles_total_), 1, [&](size_t begin, size_t end, unsigned worker) {
+    auto trace = [&](size_t begin, size_t end, unsigned worker) {
         for (size_t t = begin; t < end; t++) {
             PixelBlock block;
             int x = int(t % size_t(columns)) * TILE_SIZE, y = int(t / size_t(columns)) * TILE_SIZE;
@@ -192,7 +203,11 @@ bool Renderer::render(u32 first, u32 count) {
             }
             tiles_done_.fetch_add(1, std::memory_order_relaxed);
         }
-    });
+    };
+    try {
+        pool_.parallel_for(size_t(tiles_total_), 1, trace);
+    } catch (const Cancelled&) {  // the film holds what was traced
+    }
     stats_.trace_seconds += seconds_now() - start;
     return !cancelled_.load();
 }

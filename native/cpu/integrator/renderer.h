@@ -46,18 +46,25 @@ class Renderer {
     Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input);
     ~Renderer();
 
+    // Builds structures and lights, once, before the first render(). Returns false when cancelled.
+    bool prepare();
+
     // Traces samples [first, first + count) of every pixel into the film. Returns false when cancelled; the
     // film then holds what was traced, pixel by pixel with its own sample count.
     bool render(u32 first, u32 count);
 
-    // From any thread: makes render() return within one batch's time.
-    void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+    // From any thread, for good: render() returns within one batch's time, prepare() within one step of building.
+    void cancel() {
+        cancelled_.store(true, std::memory_order_relaxed);
+        pool_.cancel();
+    }
     // Share of the running step that is done, 0..1.
     double step_progress() const;
     RenderStats stats() const;
     const Film& film() const { return film_; }
 
  private:
+    void build_all();
     void find_constants();
     void build_lights();
     WorldSun find_sun(WorldInput& world);  // and tells the world of it

@@ -1,0 +1,58 @@
+"""The loop over samples: what a caller is told, and how soon it can stop."""
+
+from __future__ import annotations
+
+import numpy as np
+from luch.render import Progress, render
+from luch.scene import Camera, Film, Instances, Material, Mesh, Object, Scene, Settings
+from luch.shader import ProgramBuilder
+
+
+def heavy_scene(triangles: int) -> Scene:
+    """So many small triangles that building takes much longer than the caller's first look."""
+    rng = np.random.default_rng(5)
+    corners = rng.uniform(-1, 1, (triangles, 1, 3)) + rng.normal(size=(triangles, 3, 3)) * 0.01
+    mesh = Mesh(
+        "Dust",
+        corners.reshape(-1, 3).astype(np.float32),
+        np.arange(3 * triangles, dtype=np.uint32).reshape(-1, 3),
+        np.zeros(triangles, np.uint16),
+    )
+    here = np.eye(3, 4)[None]
+    one = Instances(np.zeros(1, np.uint32), here, np.zeros(1, np.float32), np.zeros((1, 3), np.float32),
+                    np.zeros((1, 2), np.float32))  # fmt: skip
+    return Scene(
+        name="Heavy",
+        meshes=[mesh],
+        objects=[Object("Dust", 0, [0])],
+        instances=one,
+        materials=[Material("Plain", ProgramBuilder().finish())],
+        camera=Camera(),
+        film=Film(width=16, height=16),
+        settings=Settings(samples=4, threads=1),
+    )
+
+
+def test_a_cancel_while_structures_are_built_ends_the_building() -> None:
+    told: list[Progress] = []
+
+    def stop(progress: Progress) -> bool:
+        told.append(progress)
+        return False
+
+    result = render(heavy_scene(1_500_000), progress=stop)
+    assert result.cancelled
+    assert [progress.preparing for progress in told] == [True]
+    assert result.stats["samples"] == 0
+    assert result.stats["bvh_nodes"] == 0, "the tree was built to its end"
+    assert not result.passes["Combined"].any()
+
+
+def test_a_render_that_goes_on_is_told_of_building_then_of_samples() -> None:
+    told: list[Progress] = []
+    result = render(heavy_scene(300_000), progress=lambda progress: told.append(progress) is None)
+    assert not result.cancelled
+    assert result.stats["bvh_nodes"] > 0
+    kinds = [progress.preparing for progress in told]
+    assert kinds == sorted(kinds, reverse=True)
+    assert told[-1].samples == 4
