@@ -57,9 +57,8 @@ def _build_wheel_for(tag: str, headers: Path, wheel: Path, isas: str, jobs: int)
     suffix = f".cpython-{tag[2:]}-x86_64-linux-gnu.so"
     options = [
         *core_options(isas, str(VENV_PYTHON)),
-        f"-DPython_INCLUDE_DIR={headers}",
-        f"-DPYTHON_MODULE_EXTENSION={suffix}",
-        "-DPYTHON_MODULE_DEBUG_POSTFIX=",
+        f"-DLUCH_PYTHON_HEADERS={headers}",
+        f"-DLUCH_MODULE_SUFFIX={suffix}",
         f"-DLUCH_OUTPUT_DIR={modules}",
     ]
     configure_and_make(folder, options, jobs)

@@ -56,3 +56,22 @@ def test_installed_from_the_zip_into_an_empty_user_folder_it_renders(extension_z
     pixels = np.asarray(oiio.ImageInput.open(str(picture)).read_image(oiio.FLOAT))
     assert pixels.shape[:2] == (32, 48)
     assert 0.02 < pixels[..., :3].mean() < 0.98 and pixels[..., :3].std() > 0.02, "a picture, not a blank"
+
+
+def test_a_python_that_cannot_be_run_needs_its_headers_alone(tmp_path: Path) -> None:
+    """As for a distribution's Blender: CMake must neither look for an interpreter nor compare versions."""
+    from buildtools.compile_core import core_options
+    from buildtools.places import NATIVE, tool
+
+    headers = tmp_path / "python3.99"
+    headers.mkdir()
+    (headers / "Python.h").touch()
+    suffix = ".cpython-399-x86_64-linux-gnu.so"
+    options = [*core_options("v2;v3", sys.executable), f"-DLUCH_PYTHON_HEADERS={headers}"]
+    options += [f"-DLUCH_MODULE_SUFFIX={suffix}", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}"]
+    build = tmp_path / "build"
+    subprocess.run([tool("cmake"), "-S", str(NATIVE), "-B", str(build), "-G", "Ninja", *options], check=True)
+    recipe = (build / "build.ninja").read_text()
+    assert f"_core_v2{suffix}" in recipe
+    assert f"_core_v3{suffix}" in recipe
+    assert f"-isystem {headers}" in recipe
