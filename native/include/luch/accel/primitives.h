@@ -42,10 +42,12 @@ struct Counters {
         ++primitives;
         bytes += size;
     }
+    LUCH_FN void list(u32 size) { bytes += size; }
 };
 struct NoCounters {
     LUCH_FN void node(u32, u32) {}
     LUCH_FN void primitive(u32) {}
+    LUCH_FN void list(u32) {}
 };
 
 // A ray prepared for one precision's primitive test.
