@@ -8,6 +8,10 @@ std::unique_ptr<Structure> build_structure(StructureKind kind, const StructureIn
     switch (kind) {
         case StructureKind::BRUTE_FORCE:
             return build_brute_force(input, pool);
+        case StructureKind::BVH2:
+            return build_bvh2(input, pool);
+        case StructureKind::BVH2_STACKLESS:
+            return build_bvh2_stackless(input, pool);
         default:
             throw std::invalid_argument("This structure is not in this build.");
     }

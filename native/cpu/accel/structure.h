@@ -96,5 +96,7 @@ class StructureOf : public Structure {
 
 // One builder a kind, each in its own file.
 std::unique_ptr<Structure> build_brute_force(const StructureInput& input, ThreadPool& pool);
+std::unique_ptr<Structure> build_bvh2(const StructureInput& input, ThreadPool& pool);
+std::unique_ptr<Structure> build_bvh2_stackless(const StructureInput& input, ThreadPool& pool);
 
 }  // namespace luch::cpu
