@@ -151,6 +151,15 @@ def test_a_shared_header_is_fit_for_the_device(header: Path) -> None:
         assert not asks, f"only platform.h asks which compiler reads it: {asks}"
 
 
+def test_builtins_of_shared_headers_are_known_to_nvrtc() -> None:
+    """nvcc takes GNU's builtins from the C++ compiler; NVRTC has only those that platform.h gives it."""
+    known = set(re.findall(r"#define (__builtin_\w+)", (INCLUDE / "luch" / "platform.h").read_text(encoding="utf-8")))
+    known |= {f"__builtin_{name}" for name in ("bit_cast", "ctz", "clz", "popcount", "fmaf", "convertvector")}
+    for header in headers():
+        used = set(re.findall(r"__builtin_\w+", code_only(header.read_text(encoding="utf-8"))))
+        assert used <= known, f"{header_id(header)}: platform.h gives NVRTC no {sorted(used - known)}"
+
+
 def test_cpu_sources_include_no_python_and_bindings_only_pybind11() -> None:
     for path in tracked(".h", ".cpp"):
         if path.is_relative_to(ROOT / "native" / "cpu"):

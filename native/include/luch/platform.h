@@ -16,6 +16,20 @@
 #define LUCH_CONST inline constexpr
 #endif
 
+#if defined(__CUDACC_RTC__)  // knows CUDA's functions, not the builtins that nvcc takes from the C++ compiler
+#define __builtin_huge_valf() __builtin_bit_cast(float, 0x7f800000u)
+#define __builtin_fabsf fabsf
+#define __builtin_copysignf copysignf
+#define __builtin_sqrtf sqrtf
+#define __builtin_sqrt sqrt
+#define __builtin_floorf floorf
+#define __builtin_ceilf ceilf
+#define __builtin_truncf truncf
+#define __builtin_sinhf sinhf
+#define __builtin_coshf coshf
+#define __builtin_tanhf tanhf
+#endif
+
 namespace luch {
 
 using i8 = signed char;

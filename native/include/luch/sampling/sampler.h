@@ -73,7 +73,7 @@ LUCH_FN Vec2 sample_2d(const Sampler& s, u32 dimension) {
 struct ThirdSobolTable {
     u32 by_byte[4][256];
 
-    constexpr ThirdSobolTable() : by_byte{} {
+    LUCH_FN constexpr ThirdSobolTable() : by_byte{} {
         u32 m[32] = {1u, 3u};
         for (int k = 2; k < 32; ++k) m[k] = (m[k - 1] << 1) ^ (m[k - 2] << 2) ^ m[k - 2];
         for (int byte = 0; byte < 4; ++byte) {
