@@ -1,0 +1,199 @@
+// The kd-tree: space is cut by planes, a primitive stands in every cell that it touches. Nodes of 8 bytes.
+//
+// The ray is the cone of math/bounds.h, 1: some point Q of every hit lies in it at t and in the primitive's widened
+// box. Going along the axis, the cone may still be on the near side of a plane until (plane - far_origin) far_rdir
+// and may be beyond it from (plane - near_origin) near_rdir (BoxRay, box.h); both sides are visited where the two
+// overlap, so the cell that holds Q is. All t here are what the primitive's test reports: the rdirs hold its rounding.
+// A cell that begins exactly at the best t is visited still: it may hold a smaller ref.
+#pragma once
+#include "luch/accel/primitives.h"
+
+namespace luch {
+
+// Inner: link = (node above the plane) << 2 | axis, the node below comes next; value = the plane's float bits.
+// Leaf: link = (first ref) << 2 | KD_LEAF; value = the number of refs.
+struct KdNode {
+    u32 link, value;
+};
+inline constexpr u32 KD_LEAF = 3;
+inline constexpr u32 KD_MAX_LINK = (1u << 30) - 1;
+inline constexpr u32 KD_MAX_DEPTH = 60;  // planes on the way to any leaf
+
+struct KdTree {
+    const KdNode* nodes;  // at least one
+    const u32* refs;
+    Box root;
+};
+
+// A part of the ray in a node that is still to be visited. path: one bit, of the node's depth (KdShortStack).
+struct KdSpan {
+    u32 node;
+    float t0, t1;
+    u64 path;
+};
+inline constexpr u64 KD_ROOT_PATH = u64(1) << 63;
+
+// Room for every node that can wait.
+struct KdStack {
+    static constexpr bool RESTARTS = false;
+    u32 size = 0, node[KD_MAX_DEPTH];
+    float t0[KD_MAX_DEPTH], t1[KD_MAX_DEPTH];
+    LUCH_FN void push(const KdSpan& s) {
+        node[size] = s.node;
+        t0[size] = s.t0;
+        t1[size] = s.t1;
+        ++size;
+    }
+    LUCH_FN bool near_is_done(u64) const { return false; }
+    LUCH_FN bool pop(const KdSpan&, KdSpan* next) {
+        if (size == 0) return false;
+        --size;
+        *next = {node[size], t0[size], t1[size], 0};
+        return true;
+    }
+};
+
+// The last COUNT nodes that wait; if more did, the ray starts again at the root and is led back by its trail:
+// a bit a depth (the root's is the highest) that says the near child is done (Laine 2010, restart trail).
+template <u32 COUNT>
+struct KdShortStack {
+    static constexpr bool RESTARTS = true;
+    static_assert((COUNT & (COUNT - 1)) == 0, "a ring of a power of two");
+    u32 top = 0, size = 0;
+    KdSpan ring[COUNT];
+    u64 done = 0, waiting = 0;  // depths whose near child is done, whose far child waits
+    LUCH_FN void push(const KdSpan& s) {
+        ring[top++ & (COUNT - 1)] = s;
+        size = size < COUNT ? size + 1 : COUNT;
+        waiting |= s.path << 1;
+    }
+    LUCH_FN bool near_is_done(u64 path) const { return (done & path) != 0; }
+    LUCH_FN bool pop(const KdSpan& root, KdSpan* next) {
+        if (waiting == 0) return false;
+        u64 deepest = waiting & (0 - waiting);
+        waiting ^= deepest;
+        done = (done | deepest) & (0 - deepest);  // what lies deeper begins anew
+        if (size > 0) {
+            --size;
+            *next = ring[--top & (COUNT - 1)];
+        } else {
+            *next = root;
+            waiting = 0;
+        }
+        return true;
+    }
+};
+
+// Offers the refs of the cells along the ray, near to far, to leaf: bool leaf.offer(ref), true to end; leaf.limit(),
+// the t beyond which nothing counts.
+template <class Stack, class Leaf, class Count>
+LUCH_FN void walk_kd_tree(const KdTree& tree, const Ray& ray, Leaf& leaf, Count& count) {
+    BoxRay box = make_box_ray(ray.origin, ray.direction, tree.root);
+    KdSpan root = {0, ray.t_min, leaf.limit(), KD_ROOT_PATH};
+    for (int axis = 0; axis < 3; ++axis) {
+        bool negative = box.negative[axis] != 0;
+        float lo = tree.root.lo[axis], hi = tree.root.hi[axis];
+        root.t0 = max_f(((negative ? hi : lo) - box.near_origin[axis]) * box.near_rdir[axis], root.t0);
+        root.t1 = min_f(((negative ? lo : hi) - box.far_origin[axis]) * box.far_rdir[axis], root.t1);
+    }
+    if (root.t0 > root.t1) return;
+    Stack stack;
+    KdSpan at = root;
+    do {
+        at.t1 = min_f(leaf.limit(), at.t1);
+        if (at.t0 > at.t1) continue;
+        KdNode node = tree.nodes[at.node];
+        bool alive = true;
+        while ((node.link & 3u) != KD_LEAF) {
+            count.node(sizeof(KdNode), 1);
+            u32 axis = node.link & 3u, below = at.node + 1, above = node.link >> 2;
+            float plane = bits_float(node.value);
+            float t_near = (plane - box.near_origin[axis]) * box.near_rdir[axis];
+            float t_far = (plane - box.far_origin[axis]) * box.far_rdir[axis];
+            bool negative = box.negative[axis] != 0;
+            u32 first = negative ? above : below, second = negative ? below : above;
+            bool beyond = !(t_near > at.t1);  // NaN: the ray lies in the plane and visits both sides
+            u64 path = Stack::RESTARTS ? at.path >> 1 : 0;
+            if (at.t0 > t_far) {
+                at.node = second;
+            } else if (Stack::RESTARTS && stack.near_is_done(at.path)) {
+                if (!(alive = beyond)) break;
+                at.node = second;
+                at.t0 = max_f(t_near, at.t0);
+            } else {
+                if (beyond) {
+                    stack.push({second, max_f(t_near, at.t0), at.t1, path});
+                    at.t1 = min_f(t_far, at.t1);
+                }
+                at.node = first;
+            }
+            at.path = path;
+            node = tree.nodes[at.node];
+        }
+        if (!alive) continue;
+        count.node(sizeof(KdNode), 0);
+        count.list(u32(sizeof(u32)) * node.value);
+        const u32* refs = tree.refs + (node.link >> 2);
+        for (u32 i = 0; i < node.value; ++i)
+            if (leaf.offer(refs[i])) return;
+    } while (stack.pop(root, &at));
+}
+
+// A primitive stands in many cells: the last few that were tested are not tested again.
+template <u32 COUNT>
+struct Mailbox {
+    u32 tested[COUNT];
+    LUCH_FN Mailbox() {
+        for (u32 i = 0; i < COUNT; ++i) tested[i] = NONE;
+    }
+    LUCH_FN bool was_tested(u32 ref) {
+        u32& slot = tested[ref & (COUNT - 1)];
+        bool same = slot == ref;
+        slot = ref;
+        return same;
+    }
+};
+
+template <Precision P, class Count>
+struct ClosestLeaf {
+    const Primitives& all;
+    PrimitiveRay<P> ray;
+    float t_min;
+    RefHit* best;
+    Count& count;
+    Mailbox<8> mailbox;
+    LUCH_FN float limit() const { return best->t; }
+    LUCH_FN bool offer(u32 ref) {
+        if (!mailbox.was_tested(ref)) offer_primitive(all, ray, ref, t_min, best, count);
+        return false;
+    }
+};
+
+template <Precision P, class Count>
+struct AnyLeaf {
+    const Primitives& all;
+    PrimitiveRay<P> ray;
+    float t_min, t_max;
+    u8 blocked;
+    Count& count;
+    Mailbox<8> mailbox;
+    LUCH_FN float limit() const { return t_max; }
+    LUCH_FN bool offer(u32 ref) {
+        return !mailbox.was_tested(ref) && block_primitive(all, ray, ref, t_min, t_max, &blocked, count);
+    }
+};
+
+template <Precision P, class Stack = KdStack, class Count>
+LUCH_FN void closest_hit(const KdTree& tree, const Primitives& all, const Ray& ray, RefHit* best, Count& count) {
+    ClosestLeaf<P, Count> leaf = {all, PrimitiveRay<P>(ray), ray.t_min, best, count, {}};
+    walk_kd_tree<Stack>(tree, ray, leaf, count);
+}
+
+template <Precision P, class Stack = KdStack, class Count>
+LUCH_FN u8 any_hit(const KdTree& tree, const Primitives& all, const Ray& ray, Count& count) {
+    AnyLeaf<P, Count> leaf = {all, PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count, {}};
+    walk_kd_tree<Stack>(tree, ray, leaf, count);
+    return leaf.blocked;
+}
+
+}  // namespace luch

@@ -1,0 +1,182 @@
+"""The kd-tree and the grids give brute force's hits, bit for bit, at a bounded price."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from luch.accel import Accel, Kind
+from native.test_accel import HARD_MESHES
+from numpy.typing import NDArray
+from support.accel_meshes import F32, Mesh, aimed_rays, icosphere, random_rays, rows, separate, soup
+
+KINDS: tuple[Kind, ...] = ("KD_TREE",)
+RAYS = 2500
+EXTRA_MESHES: dict[str, Mesh] = {
+    "cube of large triangles": separate(3 * np.random.default_rng(5).uniform(-1, 1, (60, 3, 3))),
+    "sticks": separate(
+        np.random.default_rng(6).uniform(-1, 1, (900, 1, 3))
+        + np.random.default_rng(7).normal(size=(900, 3, 3)) * np.array([[0], [0.01], [0.8]])
+    ),
+}
+MESHES = HARD_MESHES | EXTRA_MESHES
+NEEDLES = ("collinear", "points")
+
+
+def axis_rays(mesh: Mesh, count: int, seed: int = 5) -> F32:
+    """Along an axis, the other components +0 or -0, through coordinates of vertices: in the planes of the cells."""
+    rng = np.random.default_rng(seed)
+    points = mesh[0]
+    middle = points.mean(0, dtype=np.float64)
+    size = np.abs(points - middle).max()
+    origin = points[rng.integers(len(points), size=(count, 3)), np.arange(3)].astype(np.float64)
+    axis = np.arange(3) == rng.integers(3, size=(count, 1))
+    origin = np.where(axis, middle + size * rng.uniform(-2, 2, (count, 3)), origin)
+    direction = np.where(axis, rng.choice([-1.0, 1.0], (count, 3)), rng.choice([0.0, -0.0], (count, 3)))
+    return rows(origin.astype(np.float32), direction)
+
+
+def far_rays(mesh: Mesh, count: int, distance: float = 1e4, seed: int = 6) -> F32:
+    """Aimed at the mesh from `distance` times its size away."""
+    rays = aimed_rays(mesh, count, seed)
+    target = (rays[:, :3] + rays[:, 4:7]).astype(np.float64)
+    size = max(np.abs(mesh[0] - mesh[0].mean(0, dtype=np.float64)).max(), 1e-30)
+    way = np.random.default_rng(seed).normal(size=(count, 3))
+    origin = (target + distance * size * way).astype(np.float32)
+    return rows(origin, target - origin)
+
+
+def short_rays(mesh: Mesh, count: int) -> F32:
+    """Aimed rays whose intervals begin and end somewhere along the way."""
+    rng = np.random.default_rng(8)
+    rays = aimed_rays(mesh, count, 9)
+    rays[:, 3], rays[:, 7] = rng.uniform(-0.5, 1, count), rng.uniform(0.5, 2, count)
+    return rays
+
+
+def hard_rays(mesh: Mesh, count: int = RAYS) -> F32:
+    """Rays of every kind."""
+    makers = (aimed_rays, axis_rays, far_rays, short_rays)
+    return np.concatenate([random_rays(count), *(make(mesh, count) for make in makers)])
+
+
+def assert_hits_are_brute_forces(mesh: Mesh, rays: F32, kind: Kind, spheres: NDArray[np.float32] | None = None) -> int:
+    """Compares every bit of t, primitive, u, v, and any-hit; returns how many rays hit."""
+    ours = Accel(*mesh, kind=kind, spheres=spheres, threads=1)
+    truth = Accel(*mesh, kind="BRUTE_FORCE", spheres=spheres, threads=1)
+    expected = truth.closest(rays)
+    differ = np.zeros(len(rays), bool)
+    for a, b in zip(ours.closest(rays), expected, strict=True):
+        differ |= a.view(np.uint32) != b.view(np.uint32)
+    assert int(differ.sum()) == 0, rays[differ][:3]
+    assert np.array_equal(ours.any(rays), expected[1] >= 0)
+    return int((expected[1] >= 0).sum())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", MESHES)
+def test_hits_are_bit_equal_to_brute_force(name: str, kind: Kind) -> None:
+    hit = assert_hits_are_brute_forces(MESHES[name], hard_rays(MESHES[name]), kind)
+    assert hit > 0 or name in NEEDLES, "these rays prove nothing"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("scale", [1e-18, 1e-9, 1e6, 1e18])
+def test_hits_are_bit_equal_to_brute_force_at_any_scale(scale: float, kind: Kind) -> None:
+    points, triangles = soup(300)
+    mesh = ((points * scale).astype(np.float32), triangles)
+    assert assert_hits_are_brute_forces(mesh, hard_rays(mesh, 1000), kind) > 1000
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("distance", [1e3, 1e5, 1e7])
+def test_hits_are_bit_equal_to_brute_force_far_from_the_origin(distance: float, kind: Kind) -> None:
+    points, triangles = soup(300)
+    mesh = ((points * 10 + np.float32([1, 0.7, -1.3]) * distance).astype(np.float32), triangles)
+    assert assert_hits_are_brute_forces(mesh, hard_rays(mesh, 1000), kind) > 1000
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_spheres_among_triangles_are_hit_as_by_brute_force(kind: Kind) -> None:
+    rng = np.random.default_rng(4)
+    spheres = np.concatenate([rng.uniform(-1, 1, (300, 3)), rng.exponential(0.05, (300, 1))], 1).astype(np.float32)
+    mesh = soup(200, 0.1)
+    assert assert_hits_are_brute_forces(mesh, hard_rays(mesh), kind, spheres) > 1000
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("scale", "offset"), [(1e-18, 0.0), (1.0, 0.0), (100.0, 1e5), (100.0, 1e7), (1e18, 0.0)])
+def test_closed_mesh_lets_no_ray_out(scale: float, offset: float, kind: Kind) -> None:
+    points, triangles = icosphere(4)
+    middle = np.array([1, 0.7, -1.3]) * offset
+    mesh = ((points * np.float64(scale) + middle).astype(np.float32), triangles)
+    rays = aimed_rays(mesh, 20_000, 11)
+    target = rays[:, :3] + rays[:, 4:7]
+    origin = (middle + 0.3 * scale * np.random.default_rng(1).uniform(-1, 1, (20_000, 3))).astype(np.float32)
+    rays = rows(origin, target - origin)
+    assert int((Accel(*mesh, kind=kind, threads=1).closest(rays)[1] < 0).sum()) == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("precision", ["FAST", "DOUBLE"])
+def test_other_precisions_agree_with_their_brute_force_away_from_edges(precision: str, kind: Kind) -> None:
+    mesh = soup()
+    rays = random_rays(RAYS)
+    ours = Accel(*mesh, kind=kind, precision=precision).closest(rays)  # type: ignore[arg-type]
+    truth = Accel(*mesh, kind="BRUTE_FORCE", precision=precision).closest(rays)  # type: ignore[arg-type]
+    assert int((ours[1] != truth[1]).sum()) == 0
+    assert np.array_equal(ours[0], truth[0])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_threads_and_quality_change_no_hit_and_threads_no_bit_of_the_structure(kind: Kind) -> None:
+    mesh = icosphere(6)  # 81,920: several chunks and subtrees
+    rays = random_rays(3000)
+    one = Accel(*mesh, kind=kind, threads=1)
+    expected = one.closest(rays)
+    _, arrays = one._structure.device_arrays()
+    for threads in (2, 5):
+        _, others = Accel(*mesh, kind=kind, threads=threads)._structure.device_arrays()
+        assert [a == b for a, b in zip(arrays, others, strict=True)] == [True] * len(arrays)
+    for quality in ("FAST", "HIGH"):
+        found = Accel(*mesh, kind=kind, quality=quality).closest(rays)  # type: ignore[arg-type]
+        assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_and_degenerate_things_are_built_and_missed(kind: Kind) -> None:
+    rays = random_rays(100)
+    nothing = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)
+    point = separate(np.zeros((50, 3, 3)))
+    for mesh in (nothing, point):
+        accel = Accel(*mesh, kind=kind)
+        assert (accel.closest(rays)[1] == -1).all()
+        assert not accel.any(rays).any()
+
+
+MANY = 50_000
+SHAPE = np.random.default_rng(1).normal(size=(3, 3))
+CROWDS = {
+    "identical": np.repeat(SHAPE[None], MANY, axis=0),
+    "in one plane": np.random.default_rng(1).normal(size=(MANY, 3, 3)) * [1, 1, 0],
+    "shrinking slowly": 0.9999 ** np.arange(MANY)[:, None, None] * SHAPE,
+    "shrinking fast": 2.0 ** -(np.arange(MANY) % 120)[:, None, None] * SHAPE,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", CROWDS)
+def test_builder_finishes_with_a_bounded_structure_on(name: str, kind: Kind) -> None:
+    mesh = separate(CROWDS[name])
+    stats = Accel(*mesh, kind=kind).stats
+    assert stats["bytes"] <= 60 * MANY  # kd-tree: 46 in one plane
+    assert stats["depth"] <= 60
+    rays = aimed_rays(mesh, 100)
+    assert_hits_are_brute_forces(mesh, rays, kind)
+
+
+def test_kd_tree_tests_few_primitives() -> None:
+    mesh = icosphere(6)
+    rays = random_rays(5000)
+    counts = Accel(*mesh, kind="KD_TREE", threads=1).count(rays)
+    assert counts["nodes"] <= 12 * len(rays)  # 10.4 measured, of 81,920 triangles
+    assert counts["primitives"] <= 1.3 * len(rays)  # 1.11
