@@ -26,12 +26,27 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
     accelerator: EnumProperty(
         name="Structure",
         items=[
-            ("AUTO", "Automatic", "The fastest structure for the scene"),
-            ("BVH8", "BVH, 8 wide", "Bounding volume hierarchy with eight children a node"),
-            ("BRUTE", "Brute Force", "Every ray tests every triangle: the oracle, for tiny scenes"),
+            ("AUTO", "Automatic", "The fastest in a trial on the scene itself"),
+            ("BVH", "BVH", "Bounding volume hierarchy, eight boxes a node: the fastest on nearly every scene"),
+            ("BVH2", "Binary BVH", "Bounding volume hierarchy, two boxes a node"),
+            ("BVH2_STACKLESS", "Stackless BVH", "Binary tree walked by skip pointers, always left to right"),
+            ("KD_TREE", "kd-Tree", "Space cut by planes: good where long thin triangles overlap"),
+            ("HIERARCHICAL_GRID", "Hierarchical Grid", "Cells, where dense divided again"),
+            ("GRID", "Uniform Grid", "Equal cells: good for evenly spread small triangles"),
+            ("BRUTE_FORCE", "Brute Force", "Every ray tests every triangle: the oracle, for tiny scenes"),
         ],
         default="AUTO",
         description="Acceleration structure that rays travel through",
+    )
+    precision: EnumProperty(
+        name="Precision",
+        items=[
+            ("FAST", "Fast", "Single precision: a ray along an edge may slip between two triangles"),
+            ("WATERTIGHT", "Watertight", "No ray slips between two triangles that share an edge"),
+            ("DOUBLE", "Double", "Intersections in double precision"),
+        ],
+        default="WATERTIGHT",
+        description="How exactly rays and triangles are compared",
     )
     threads: IntProperty(name="Threads", default=0, min=0, max=1024, description="Threads to use; 0 for all")
     samples: IntProperty(name="Max Samples", default=128, min=1, max=1 << 24, description="Paths through every pixel")

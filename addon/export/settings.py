@@ -37,6 +37,7 @@ def export_settings(context: ExportContext) -> Settings:
         filter_glossy=effective(scene, "blur_glossy"),
         light_tree=effective(scene, "use_light_tree"),
         accelerator=scene.luch.accelerator,
+        precision=scene.luch.precision,
         **{name: effective(scene, name) for name in SAME_NAME},
     )
     if context.view_layer.samples > 0:

@@ -119,7 +119,7 @@ class LUCH_RENDER_PT_performance(LuchPanel, bpy.types.Panel):
 
     def draw(self, context: Any) -> None:
         scene = context.scene
-        draw_settings(self.layout, scene, "device", "accelerator", "threads")
+        draw_settings(self.layout, scene, "device", "accelerator", "precision", "threads")
         self.layout.prop(scene.render, "use_persistent_data")
 
 

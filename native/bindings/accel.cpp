@@ -24,11 +24,11 @@ constexpr Affine IDENTITY = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
 class ArrayAccel {
  public:
     // meshes: (M, 4) first vertex, vertices, first triangle, triangles. instance_meshes: (I,). to_world and
-    // to_object: (I, 12). visibility: (I,) RayKind bits. flags: one per triangle, or none.
+    // to_object: (I, 12). visibility: (I,) RayKind bits. flags: one per triangle, or none. kind: StructureKind; -1: the eight-wide tree.
     ArrayAccel(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags,
                const IndexArray& meshes, const IndexArray& instance_meshes, const FloatArray& to_world,
-               const FloatArray& to_object, const IndexArray& visibility, bool brute_force, unsigned threads,
-               u64 flatten_triangles)
+               const FloatArray& to_object, const IndexArray& visibility, int kind, u32 quality, u32 precision,
+               unsigned threads, u64 flatten_triangles)
         : pool_(threads) {
         std::vector<MeshView> mesh_views(size_t(meshes.shape(0)), MeshView{});
         std::vector<std::vector<u8>> mesh_flags;
@@ -55,8 +55,12 @@ class ArrayAccel {
         scene.instances = instances.data();
         scene.instance_count = u32(instances.size());
         py::gil_scoped_release release;
-        auto kind = brute_force ? cpu::AccelKind::BRUTE_FORCE : cpu::AccelKind::BVH;
-        accel_ = Accel::build(scene, mesh_flags, pool_, kind, flatten_triangles);
+        cpu::AccelChoice choice;
+        choice.wide = kind < 0;
+        if (!choice.wide) choice.kind = cpu::StructureKind(kind);
+        choice.quality = cpu::BuildQuality(quality);
+        choice.precision = Precision(precision);
+        accel_ = Accel::build(scene, mesh_flags, pool_, choice, flatten_triangles);
     }
 
     // kinds: one RayKind mask per ray, or none.
@@ -136,7 +140,7 @@ FloatArray spawn_rays(const FloatArray& corners, const FloatArray& uv, const Flo
 void bind_accel(py::module_& m) {
     py::class_<ArrayAccel>(m, "ArrayAccel")
         .def(py::init<const FloatArray&, const IndexArray&, const ByteArray&, const IndexArray&, const IndexArray&,
-                      const FloatArray&, const FloatArray&, const IndexArray&, bool, unsigned, u64>())
+                      const FloatArray&, const FloatArray&, const IndexArray&, int, u32, u32, unsigned, u64>())
         .def("closest", &ArrayAccel::closest)
         .def("any", &ArrayAccel::any)
         .def("stats", &ArrayAccel::stats);

@@ -37,12 +37,14 @@ class PyRenderer {
         d["shadow_rays"] = s.counts.shadow_rays;
         d["surface_points"] = s.counts.surface_points;
         d["non_finite_samples"] = s.counts.bad_samples;
+        d["accelerator"] = s.accel_name;
+        d["accelerator_reason"] = s.accel_reason;
         d["triangles"] = s.accel.triangles;
-        d["bvh_nodes"] = s.accel.nodes;
-        d["bvh_bytes"] = s.accel.bytes;
+        d["structure_nodes"] = s.accel.nodes;
+        d["structure_bytes"] = s.accel.bytes;
         d["dropped_triangles"] = s.accel.dropped_triangles;
         d["dropped_instances"] = dropped_instances_;
-        d["bvh_seconds"] = s.accel_seconds;
+        d["structure_seconds"] = s.accel_seconds;
         d["lights_seconds"] = s.lights_seconds;
         d["trace_seconds"] = s.trace_seconds;
         d["scene_bytes"] = s.scene_bytes;

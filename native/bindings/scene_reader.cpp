@@ -377,13 +377,8 @@ struct Reader {
         input.seed = count("seed");
         input.samples = count("samples");
         input.threads = count("threads");
-        std::string accelerator = py::cast<std::string>(settings.attr("accelerator"));
-        if (accelerator == "BRUTE_FORCE")
-            input.accel_kind = cpu::AccelKind::BRUTE_FORCE;
-        else if (accelerator != "AUTO" && accelerator != "BVH") {
-            throw std::invalid_argument("Accelerator \"" + accelerator +
-                                        "\" is not known; take AUTO, BVH or BRUTE_FORCE.");
-        }
+        input.accel = cpu::accel_request(py::cast<std::string>(settings.attr("accelerator")),
+                                         py::cast<std::string>(settings.attr("precision")));
     }
 };
 

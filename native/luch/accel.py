@@ -24,7 +24,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 PRECISIONS: tuple[Precision, ...] = get_args(Precision)
 QUALITIES: tuple[Quality, ...] = get_args(Quality)
 # StructureKind of cpu/accel/structure.h
-_STRUCTURES = ("BRUTE_FORCE", "GRID", "HIERARCHICAL_GRID", "BVH2", "BVH2_STACKLESS", "KD_TREE", "CWBVH")
+STRUCTURES = ("BRUTE_FORCE", "GRID", "HIERARCHICAL_GRID", "BVH2", "BVH2_STACKLESS", "KD_TREE", "CWBVH")
 _ALL_KINDS = np.zeros(0, np.uint32)  # no mask: every ray sees everything
 
 
@@ -68,19 +68,22 @@ class Accel:
             if flags.shape != (count,):
                 raise ValueError(f"may_be_transparent has shape {flags.shape}; it must be ({count},).")
         self.kind, self.precision = kind, precision
+        self._triangle_count = len(corners)
         self._precision = PRECISIONS.index(precision)
         self._wide: Any = None
         self._structure: Any = None
-        if kind == "BVH" and precision == "WATERTIGHT" and not len(balls):
+        if kind == "BVH":
             mesh = np.array([[0, len(points), 0, len(corners)]], np.uint32)
             here = np.eye(3, 4, dtype=np.float32).reshape(1, 12)
             self._wide = core.ArrayAccel(
                 points, corners, flags, mesh, np.zeros(1, np.uint32), here, here, np.full(1, 63, np.uint32),
-                False, threads, 0)  # fmt: skip
-        elif kind == "BVH":
-            raise ValueError(f"kind BVH has no {'spheres' if len(balls) else precision} yet; BVH2 has.")
+                -1, QUALITIES.index(quality), self._precision, threads, 0)  # fmt: skip
+            if len(balls):  # a tree of their own: the wide tree's blocks hold triangles
+                self._structure = core.ArrayStructure(
+                    points, np.full_like(corners, 0xFFFFFFFF), balls, flags, STRUCTURES.index("BVH2"),
+                    QUALITIES.index(quality), threads)  # fmt: skip
         else:
-            number, detail = _STRUCTURES.index(kind), QUALITIES.index(quality)
+            number, detail = STRUCTURES.index(kind), QUALITIES.index(quality)
             self._structure = core.ArrayStructure(points, corners, balls, flags, number, detail, threads)
 
     def closest(self, rays: npt.ArrayLike) -> tuple[Float32s, Int32s, Float32s, Float32s]:
@@ -91,20 +94,25 @@ class Accel:
         direction misses.
         """
         given = _rows(rays, 8, np.float32, "rays")
-        if self._structure is not None:
+        if self._wide is None:
             t, prim, u, v, _ = self._structure.closest(given, self._precision, False)
-        else:
-            t, prim, u, v, _ = self._wide.closest(given, _ALL_KINDS)
+            return t, prim, u, v
+        t, prim, u, v, _ = self._wide.closest(given, _ALL_KINDS)
+        if self._structure is not None:
+            ball_t, ball, _, _, _ = self._structure.closest(given, self._precision, False)
+            nearer = ball_t < t  # of equal ones the triangle: its number is the smaller
+            t, prim = np.where(nearer, ball_t, t), np.where(nearer, ball, prim)
+            u, v = np.where(nearer, np.float32(0), u), np.where(nearer, np.float32(0), v)
         return t, prim, u, v
 
     def blocked(self, rays: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         """What lies in each ray's interval: 0 nothing, 1 something opaque, 2 only what may be transparent."""
         given = _rows(rays, 8, np.float32, "rays")
+        found = [] if self._wide is None else [self._wide.any(given, _ALL_KINDS)]
         if self._structure is not None:
-            result: npt.NDArray[np.uint8] = self._structure.any(given, self._precision, False)[0]
-        else:
-            result = self._wide.any(given, _ALL_KINDS)
-        return result
+            found.append(self._structure.any(given, self._precision, False)[0])
+        opaque = np.any([each == 1 for each in found], axis=0)
+        return np.where(opaque, np.uint8(1), np.max(found, axis=0))
 
     def any(self, rays: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Whether each ray hits anything. rays: (N, 8) float32; returns (N,) bool."""
@@ -113,7 +121,7 @@ class Accel:
     def count(self, rays: npt.ArrayLike, any_hit: bool = False) -> dict[str, int]:
         """The work of tracing these rays, all together: nodes, boxes (or planes), primitives tested, bytes read."""
         given = _rows(rays, 8, np.float32, "rays")
-        if self._structure is None:
+        if self._wide is not None:
             raise ValueError("kind BVH does not count its work; the other kinds do.")
         trace = self._structure.any if any_hit else self._structure.closest
         counts: dict[str, int] = trace(given, self._precision, True)[-1]
@@ -122,8 +130,15 @@ class Accel:
     @property
     def stats(self) -> dict[str, float]:
         """Counts of the structure: its primitives (triangles), nodes, bytes, and how many primitives were dropped."""
-        source = self._structure if self._structure is not None else self._wide
-        result: dict[str, float] = source.stats()
+        if self._wide is None:
+            return dict(self._structure.stats())
+        result: dict[str, float] = self._wide.stats()
+        if self._structure is not None:
+            balls = self._structure.stats()
+            result["spheres"] = balls["primitives"]
+            result["nodes"] += balls["nodes"]
+            result["bytes"] += balls["bytes"] + 16 * balls["primitives"]
+            result["dropped_triangles"] += balls["dropped"] - self._triangle_count  # it was given none of them
         return result
 
 

@@ -216,7 +216,8 @@ class Settings:
     caustics_refractive: bool = True
     light_tree: bool = True
     light_sampling_threshold: float = 0.01
-    accelerator: str = "AUTO"
+    accelerator: str = "AUTO"  # or a kind of luch.accel
+    precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
     integrator: str = "PATH"
     ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import pytest
+from luch.accel import KINDS, PRECISIONS
 
-from addon import passes
+from addon import engine, passes
 from addon.settings import SHARED_WITH_CYCLES, effective, follows_cycles
 
 
@@ -59,3 +62,21 @@ def test_a_pass_asked_of_cycles_is_delivered_by_luch(scene: bpy.types.Scene) -> 
     layer.cycles.denoising_store_passes = True
     names = {entry.name for entry in passes.enabled_passes(layer)}
     assert {"Denoising Albedo", "Denoising Normal"} <= names
+
+
+def test_every_structure_and_precision_that_blender_offers_renders(scene: bpy.types.Scene) -> None:
+    items = bpy.types.LuchSceneSettings.bl_rna.properties
+    offered = {item.identifier for item in items["accelerator"].enum_items}
+    assert offered == {"AUTO", *KINDS} - {"CWBVH"}, "the compressed tree is for CUDA"
+    assert {item.identifier for item in items["precision"].enum_items} == set(PRECISIONS)
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.engine = "LUCH"
+    settings: Any = scene.luch
+    settings.samples = 1
+    for name in sorted(offered - {"GRID", "HIERARCHICAL_GRID"}):
+        settings.accelerator = name
+        bpy.ops.render.render(scene=scene.name)
+        assert engine.last_stats[scene.name]["accelerator"] == ("BVH" if name == "AUTO" else name)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
+import pytest
+from luch.accel import KINDS
 from luch.render import Progress, render
 from luch.scene import Camera, Film, Instances, Material, Mesh, Object, Scene, Settings
 from luch.shader import ProgramBuilder
@@ -33,6 +37,31 @@ def heavy_scene(triangles: int) -> Scene:
     )
 
 
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("BVH", "CWBVH", "HIERARCHICAL_GRID", "GRID")])
+def test_the_structure_does_not_change_the_picture(kind: str) -> None:
+    scenes = [heavy_scene(200) for _ in range(2)]
+    scenes[1].settings.accelerator = kind
+    truth, ours = (render(scene) for scene in scenes)
+    assert ours.stats["accelerator"] == kind
+    assert ours.stats["accelerator_reason"] == "chosen by the user"
+    for name, image in truth.passes.items():
+        assert np.array_equal(image.view(np.uint32), ours.passes[name].view(np.uint32)), name
+
+
+def test_automatic_says_what_it_measured() -> None:
+    stats = render(heavy_scene(40)).stats
+    assert stats["accelerator"] in KINDS
+    assert re.search(r"\d million trial rays .* against .* \d", stats["accelerator_reason"])
+    assert "races" in render(heavy_scene(20_001)).stats["accelerator_reason"]
+
+
+def test_an_unknown_structure_is_refused_by_name() -> None:
+    scene = heavy_scene(1)
+    scene.settings.accelerator = "OCTREE"
+    with pytest.raises(ValueError, match=r'Structure "OCTREE" is not known; take one of AUTO, BVH, .*BRUTE_FORCE'):
+        render(scene)
+
+
 def test_a_cancel_while_structures_are_built_ends_the_building() -> None:
     told: list[Progress] = []
 
@@ -44,7 +73,7 @@ def test_a_cancel_while_structures_are_built_ends_the_building() -> None:
     assert result.cancelled
     assert [progress.preparing for progress in told] == [True]
     assert result.stats["samples"] == 0
-    assert result.stats["bvh_nodes"] == 0, "the tree was built to its end"
+    assert result.stats["structure_nodes"] == 0, "the tree was built to its end"
     assert not result.passes["Combined"].any()
 
 
@@ -52,7 +81,7 @@ def test_a_render_that_goes_on_is_told_of_building_then_of_samples() -> None:
     told: list[Progress] = []
     result = render(heavy_scene(300_000), progress=lambda progress: told.append(progress) is None)
     assert not result.cancelled
-    assert result.stats["bvh_nodes"] > 0
+    assert result.stats["structure_nodes"] > 0
     kinds = [progress.preparing for progress in told]
     assert kinds == sorted(kinds, reverse=True)
     assert told[-1].samples == 4

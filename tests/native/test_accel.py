@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from luch.accel import Accel
+from luch.accel import Accel, Precision
+from numpy.typing import NDArray
 from support.accel_meshes import (
     Mesh,
     aimed_rays,
@@ -243,3 +244,52 @@ def test_bad_input_raises_one_clear_error(change: dict[str, object], message: st
 def test_bad_rays_raise_one_clear_error() -> None:
     with pytest.raises(ValueError, match=r"rays has shape \(4, 6\)"):
         Accel(*soup(1)).closest(np.zeros((4, 6), np.float32))
+
+
+def balls(count: int = 40, seed: int = 6) -> NDArray[np.float32]:
+    rng = np.random.default_rng(seed)
+    return np.hstack([rng.uniform(-1, 1, (count, 3)), rng.uniform(0.01, 0.3, (count, 1))]).astype(np.float32)
+
+
+@pytest.mark.parametrize("precision", ["WATERTIGHT", "DOUBLE"])
+def test_tree_of_triangles_and_spheres_hits_bit_equal_to_brute_force(precision: Precision) -> None:
+    mesh = soup()
+    rays = np.concatenate([random_rays(RAYS), aimed_rays(mesh, RAYS)])
+    tree = Accel(*mesh, spheres=balls(), precision=precision)
+    oracle = Accel(*mesh, kind="BRUTE_FORCE", spheres=balls(), precision=precision)
+    for a, b in zip(tree.closest(rays), oracle.closest(rays), strict=True):
+        assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
+    assert np.array_equal(tree.any(rays), oracle.any(rays))
+    prim = tree.closest(rays)[1]
+    assert (prim >= len(mesh[1])).any() and (prim < len(mesh[1])).any()
+    assert tree.stats["spheres"] == 40
+
+
+def test_fast_tree_hits_what_fast_brute_force_hits() -> None:
+    """Bit for bit where it hits; its boxes are not made for a rounding test, so a few rays in a million may differ."""
+    mesh = icosphere(3)
+    rays = np.concatenate([random_rays(RAYS), aimed_rays(mesh, RAYS)])
+    ours, truth = (Accel(*mesh, kind=kind, precision="FAST").closest(rays) for kind in ("BVH", "BRUTE_FORCE"))
+    same = ours[1] == truth[1]
+    assert (~same).sum() <= 2
+    for a, b in zip(ours, truth, strict=True):
+        assert np.array_equal(a[same].view(np.uint32), b[same].view(np.uint32))
+
+
+def test_sphere_far_away_is_hit_where_it_is() -> None:
+    """The textbook quadratic cancels here: radius 1 at 1e5 leaves it no digits in single precision."""
+    far = np.float32([[1e5, 0, 0, 1.0]])
+    rays = rows(np.zeros((3, 3)), np.array([[1, 0, 0], [1, 0.9e-5, 0], [1, 1.1e-5, 0]]))
+    none = np.zeros((0, 3))
+    for kind in ("BVH", "BRUTE_FORCE"):
+        t, prim, _, _ = Accel(none, np.zeros((0, 3), np.uint32), kind=kind, spheres=far).closest(rays)  # type: ignore[arg-type]
+        assert list(prim) == [0, 0, -1]
+        assert t[0] == 1e5 - 1
+        assert t[1] == pytest.approx(1e5 - np.sqrt(1 - 0.81), abs=0.01)
+
+
+def test_ray_from_inside_a_sphere_hits_its_far_side() -> None:
+    one = np.float32([[0, 0, 0, 2.0]])
+    ray = rows(np.float32([[0.5, 0, 0]]), np.array([[-1.0, 0, 0]]))
+    t, prim, u, v = Accel(np.zeros((0, 3)), np.zeros((0, 3), np.uint32), spheres=one).closest(ray)
+    assert (t[0], prim[0], u[0], v[0]) == (2.5, 0, 0.0, 0.0)

@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import core
-from luch.accel import Accel
+from luch.accel import STRUCTURES, Accel
 from numpy.typing import NDArray
 from support.accel_meshes import Mesh, icosphere, random_rays, rows, separate, soup
 
 ALL = 63
 CAMERA, SHADOW = 1, 32
 NO_KINDS = np.zeros(0, np.uint32)
+
+
+# StructureKind of cpu/accel/structure.h; -1: the eight-wide tree
+_NUMBER = {"BVH": -1, **{kind: number for number, kind in enumerate(STRUCTURES)}}
 
 
 @dataclass
@@ -25,7 +29,7 @@ class Scene:
     meshes: list[Mesh]
     instances: list[tuple[int, NDArray[Any], int]] = field(default_factory=list)
 
-    def build(self, brute_force: bool = False, flatten: int = 0) -> Any:
+    def build(self, kind: str = "BVH", flatten: int = 0) -> Any:
         table, vertex, triangle = [], 0, 0
         for points, triangles in self.meshes:
             table.append([vertex, len(points), triangle, len(triangles)])
@@ -36,7 +40,7 @@ class Scene:
             np.concatenate([p for p, _ in self.meshes]), np.concatenate([t for _, t in self.meshes]),
             np.zeros(0, np.uint8), np.array(table, np.uint32), np.array([m for m, _, _ in self.instances], np.uint32),
             world, np.array(inverse, np.float32).reshape(-1, 12),
-            np.array([v for _, _, v in self.instances], np.uint32), brute_force, 1, flatten)  # fmt: skip
+            np.array([v for _, _, v in self.instances], np.uint32), _NUMBER[kind], 1, 1, 1, flatten)  # fmt: skip
 
 
 def _inverse(matrix: NDArray[Any]) -> NDArray[Any]:
@@ -64,10 +68,19 @@ def crowd(count: int, spread: float = 5.0, seed: int = 4) -> Scene:
 @pytest.mark.parametrize("flatten", [0, 40_000, 10_000_000])
 @pytest.mark.parametrize("count", [1, 2, 9, 60])
 def test_instances_hit_bit_equal_to_brute_force(count: int, flatten: int) -> None:
-    scene = crowd(count)
+    compare_with_brute_force(crowd(count), "BVH", flatten)
+
+
+@pytest.mark.parametrize("kind", ["BVH2", "BVH2_STACKLESS", "KD_TREE"])
+@pytest.mark.parametrize("flatten", [0, 40_000])
+def test_every_structure_serves_instances(kind: str, flatten: int) -> None:
+    compare_with_brute_force(crowd(9), kind, flatten)
+
+
+def compare_with_brute_force(scene: Scene, kind: str, flatten: int) -> None:
     rays = random_rays(400, scale=3.0)
-    accel = scene.build(flatten=flatten)
-    ours, truth = accel.closest(rays, NO_KINDS), scene.build(True, flatten).closest(rays, NO_KINDS)
+    accel = scene.build(kind, flatten)
+    ours, truth = accel.closest(rays, NO_KINDS), scene.build("BRUTE_FORCE", flatten).closest(rays, NO_KINDS)
     assert (truth[1] >= 0).any()
     for a, b in zip(ours, truth, strict=True):
         assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
@@ -117,8 +130,8 @@ def test_visibility_hides_instances_from_kinds_of_rays() -> None:
         for m, (scale, mask) in enumerate(((1.0, ALL & ~CAMERA), (2.0, ALL), (3.0, 0))):
             scene.instances += [(m, here * scale, mask), (m, here * scale * 1.1, mask)]
         ray = rows(np.array([[9.0, 0.1, 0.2]]), np.array([[-1.0, 0, 0]]))
-        for brute_force in (False, True):
-            accel = scene.build(brute_force, flatten)
+        for kind in ("BVH", "BRUTE_FORCE", "KD_TREE"):
+            accel = scene.build(kind, flatten)
             start = rows(np.zeros((1, 3)), np.array([[1.0, 0.1, 0.2]]))
             seen = [int(accel.closest(start, np.array([kind], np.uint32))[4][0]) for kind in (CAMERA, SHADOW, ALL)]
             assert seen == [2, 0, 0]

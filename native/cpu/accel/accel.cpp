@@ -78,8 +78,8 @@ std::vector<u8> meshes_to_flatten(const SceneView& scene, u64 budget) {
 
 class TwoLevel final : public Accel {
  public:
-    TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool, AccelKind kind,
-             u64 flatten_triangles);
+    TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
+             const AccelChoice& choice, u64 flatten_triangles);
     void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const override;
     void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const override;
     AccelStats stats() const override { return stats_; }
@@ -88,7 +88,7 @@ class TwoLevel final : public Accel {
     void plan(const SceneView& scene, u64 flatten_triangles);
     void add_entry(const SceneView& scene, u32 instance, u32 group);
     void build_groups(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
-                      bool with_tree);
+                      const AccelChoice& choice);
     void build_top(const SceneView& scene, ThreadPool& pool);
     void count();
     NodeRay top_ray(Vec3 origin, Vec3 direction, float t_min) const;
@@ -108,15 +108,16 @@ class TwoLevel final : public Accel {
     AccelStats stats_;
 };
 
-TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool, AccelKind kind,
-                   u64 flatten_triangles) {
+TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
+                   const AccelChoice& choice, u64 flatten_triangles) {
     auto start = std::chrono::steady_clock::now();
     if (!flags.empty() && flags.size() != scene.mesh_count)
         throw std::invalid_argument("triangle_flags lists " + std::to_string(flags.size()) + " meshes, the scene has " +
                                     std::to_string(scene.mesh_count) + ".");
     plan(scene, flatten_triangles);
-    build_groups(scene, flags, pool, kind == AccelKind::BVH);
-    if (kind == AccelKind::BVH && entries_.size() > 1) build_top(scene, pool);
+    build_groups(scene, flags, pool, choice);
+    bool search_entries = choice.wide || choice.kind != StructureKind::BRUTE_FORCE;  // the oracle asks them all
+    if (search_entries && entries_.size() > 1) build_top(scene, pool);
     count();
     stats_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -164,17 +165,17 @@ void TwoLevel::add_entry(const SceneView& scene, u32 i, u32 group) {
 }
 
 void TwoLevel::build_groups(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
-                            bool with_tree) {
+                            const AccelChoice& choice) {
     std::vector<u32> small;
     for (u32 g = 0; g < groups_.size(); ++g) {
         const Member& last = groups_[g].members.back();
         if (last.first_ref + scene.meshes[last.mesh].triangle_count < SMALL_GROUP_REFS)
             small.push_back(g);
         else
-            build_group(groups_[g], scene, flags, with_tree, pool);
+            build_group(groups_[g], scene, flags, choice, pool);
     }
     pool.parallel_for(small.size(), 1, [&](size_t begin, size_t end, unsigned) {
-        for (size_t i = begin; i < end; ++i) build_group(groups_[small[i]], scene, flags, with_tree, pool);
+        for (size_t i = begin; i < end; ++i) build_group(groups_[small[i]], scene, flags, choice, pool);
     });
     std::erase_if(entries_, [this](const Entry& entry) { return groups_[entry.group].triangles == 0; });
 }
@@ -222,6 +223,11 @@ void TwoLevel::count() {
         stats_.nodes += group.nodes.size();
         stats_.leaf_blocks += group.blocks.size();
         stats_.bytes += group.nodes.bytes() + group.blocks.bytes() + group.members.size() * sizeof(Member);
+        stats_.bytes += group.corners.size() * sizeof(float) + group.flags.size();
+        if (!group.structure) continue;
+        StructureStats own = group.structure->stats();
+        stats_.nodes += own.nodes;
+        stats_.bytes += own.bytes;
     }
 }
 
@@ -318,7 +324,8 @@ void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t 
     for (size_t first = 0; first < count; first += BATCH) {
         u32 size = u32(std::min<size_t>(BATCH, count - first));
         const u32* kinds = ray_kinds ? ray_kinds + first : nullptr;
-        if (one && one->nodes.size() && rays_are_scattered(rays + first, size, one->root)) {
+        if (one && one->nodes.size() && one->precision == Precision::WATERTIGHT &&
+            rays_are_scattered(rays + first, size, one->root)) {
             closest_scattered(rays + first, kinds, hits + first, size);
             continue;
         }
@@ -334,8 +341,8 @@ void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t co
 }  // namespace
 
 std::unique_ptr<Accel> Accel::build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
-                                    ThreadPool& pool, AccelKind kind, u64 flatten_triangles) {
-    return std::make_unique<TwoLevel>(scene, triangle_flags, pool, kind, flatten_triangles);
+                                    ThreadPool& pool, const AccelChoice& choice, u64 flatten_triangles) {
+    return std::make_unique<TwoLevel>(scene, triangle_flags, pool, choice, flatten_triangles);
 }
 
 }  // namespace luch::cpu

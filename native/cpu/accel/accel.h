@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "cpu/accel/structure.h"
 #include "cpu/thread_pool.h"
 #include "luch/accel/primitives.h"
 #include "luch/shade/scene_view.h"
@@ -19,7 +20,13 @@ struct AccelStats {
     double build_seconds = 0.0;
 };
 
-enum class AccelKind { BVH, BRUTE_FORCE };
+// How a group of primitives is searched: by the eight-wide tree, or by one of the race's structures.
+struct AccelChoice {
+    bool wide = true;
+    StructureKind kind = StructureKind::BRUTE_FORCE;  // unless wide
+    BuildQuality quality = BuildQuality::NORMAL;
+    Precision precision = Precision::WATERTIGHT;
+};
 
 // Instances that share a mesh are taken to the world, a copy of the triangles each, while all such copies
 // together stay below this: rays through one tree are about twice as fast as through two levels. 65 bytes and
@@ -31,7 +38,7 @@ class Accel {
     // triangle_flags: per mesh, per triangle PrimitiveFlag bits; empty, or an empty list: all opaque.
     // The scene's arrays are copied: the view may go away afterwards, the instances too.
     static std::unique_ptr<Accel> build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
-                                        ThreadPool& pool, AccelKind kind = AccelKind::BVH,
+                                        ThreadPool& pool, const AccelChoice& choice = {},
                                         u64 flatten_triangles = FLATTEN_TRIANGLES);
     virtual ~Accel() = default;
 

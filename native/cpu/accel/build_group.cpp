@@ -125,13 +125,27 @@ void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gath
     });
 }
 
-void make_list(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather) {
-    group.blocks = HugeArray<Block4>((kept + 3) / 4);
-    for (size_t b = 0; b < group.blocks.size(); ++b) {
-        u32 refs[4], count = u32(std::min<size_t>(4, kept - 4 * b));
-        for (u32 lane = 0; lane < count; ++lane) refs[lane] = boxes[4 * b + lane].id;
-        fill_block(group.blocks[b], refs, count, group, gather);
+// The triangles kept, side by side in order of ref, and the structure over them.
+void make_structure(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, const AccelChoice& choice,
+                    ThreadPool& pool) {
+    u32 ref_count = gather.ref_count();
+    group.corners.assign(9 * size_t(ref_count), 0.0f);
+    std::vector<u32> refs(kept);
+    pool.parallel_for(kept, GATHER_CHUNK, [&](size_t begin, size_t end, unsigned) {
+        for (size_t i = begin; i < end; ++i) {
+            u32 ref = refs[i] = boxes[i].id;
+            Corners3 c;
+            gather.read(ref, group.member_of(ref), &c);
+            std::copy_n(&c.p[0].x, 9, group.corners.data() + 9 * size_t(ref));
+        }
+    });
+    for (u32 ref : refs) {
+        if (gather.flagged(ref, group.member_of(ref)) == ref) continue;
+        group.flags.resize(ref_count);
+        group.flags[ref] = PRIMITIVE_MAY_BE_TRANSPARENT;
     }
+    Primitives all = {group.corners.data(), nullptr, group.flags.empty() ? nullptr : group.flags.data(), ref_count, 0};
+    group.structure = build_structure(choice.kind, {all, refs.data(), u32(kept), choice.quality}, pool);
 }
 
 }  // namespace
@@ -142,8 +156,8 @@ const Member& Group::member_of(u32 ref) const {
     return *(after - 1);
 }
 
-void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags, bool with_tree,
-                 ThreadPool& pool) {
+void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
+                 const AccelChoice& choice, ThreadPool& pool) {
     Gather gather(group, scene, flags);
     size_t kept = 0;
     HugeArray<PrimBox> boxes = gather_boxes(group, gather, pool, &kept);
@@ -151,7 +165,13 @@ void build_group(Group& group, const SceneView& scene, const std::vector<std::ve
     group.dropped = gather.ref_count() - kept;
     group.root = empty_box();
     if (kept == 0) return;
-    if (!with_tree) return make_list(group, boxes.data(), kept, gather);
+    group.precision = choice.precision;
+    if (!choice.wide) {
+        for (size_t i = 0; i < kept; ++i)
+            extend(group.root, {{-boxes[i].minus_lo[0], -boxes[i].minus_lo[1], -boxes[i].minus_lo[2]},
+                                {boxes[i].hi[0], boxes[i].hi[1], boxes[i].hi[2]}});
+        return make_structure(group, boxes.data(), kept, gather, choice, pool);
+    }
     Tree8 tree = build_bvh8(std::move(boxes), kept, 4, pool);
     group.nodes = std::move(tree.nodes);
     group.root = tree.root;

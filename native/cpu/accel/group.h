@@ -4,6 +4,7 @@
 #pragma once
 #include <vector>
 
+#include "cpu/accel/accel.h"
 #include "cpu/accel/bvh8.h"
 #include "cpu/thread_pool.h"
 #include "luch/accel/primitives.h"
@@ -21,8 +22,12 @@ struct Member {
 
 struct Group {
     std::vector<Member> members;  // by instance
-    HugeArray<Node8> nodes;       // none: a list of blocks, tested one by one (brute force)
+    Precision precision = Precision::WATERTIGHT;
+    HugeArray<Node8> nodes;       // the wide tree; none: structure holds the group
     HugeArray<Block4> blocks;
+    std::unique_ptr<Structure> structure;
+    std::vector<float> corners;   // of structure's triangles: nine floats a ref
+    std::vector<u8> flags;        // PrimitiveFlag by ref; empty: none
     Box root;
     u64 triangles = 0, dropped = 0;
 
@@ -30,8 +35,8 @@ struct Group {
 };
 
 // Fills everything but members, which say what to gather. flags: per mesh, per triangle PrimitiveFlag.
-void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags, bool with_tree,
-                 ThreadPool& pool);
+void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
+                 const AccelChoice& choice, ThreadPool& pool);
 
 // The ray in the group's space, valid, 0 <= t_min; hit->t its upper end.
 void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* hit);

@@ -1,6 +1,7 @@
 // A leaf of a group's tree: its blocks against one ray.
 #pragma once
 #include "cpu/accel/accel.h"
+#include "cpu/accel/block_tests.h"
 #include "cpu/accel/group.h"
 #include "cpu/accel/traverse.h"
 
@@ -16,7 +17,8 @@ LUCH_FN void note_blocked(u32 ref, u8* result) {
         *result = BLOCKED_MAYBE;
 }
 
-LUCH_FN void closest_in_leaf(const Group& group, const BlockRay& ray, u32 leaf, RefHit* best) {
+template <class Block>
+LUCH_FN void closest_in_leaf(const Group& group, const Block& ray, u32 leaf, RefHit* best) {
     u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
     for (u32 b = first; b < end; ++b) {
         const Block4& block = group.blocks[b];
@@ -28,7 +30,8 @@ LUCH_FN void closest_in_leaf(const Group& group, const BlockRay& ray, u32 leaf, 
     }
 }
 
-LUCH_FN void any_in_leaf(const Group& group, const BlockRay& ray, u32 leaf, float t_max, u8* result) {
+template <class Block>
+LUCH_FN void any_in_leaf(const Group& group, const Block& ray, u32 leaf, float t_max, u8* result) {
     u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
     for (u32 b = first; b < end; ++b) {
         const Block4& block = group.blocks[b];

@@ -50,7 +50,10 @@ bool Renderer::prepare() {
 void Renderer::build_all() {
     scene_.view = store_->finish();
     double start = seconds_now();
-    accel_ = Accel::build(scene_.view, store_->transparency_flags(), pool_, input_.accel_kind);
+    ChosenAccel chosen = build_chosen(scene_.view, store_->transparency_flags(), pool_, input_.accel);
+    accel_ = std::move(chosen.accel);
+    stats_.accel_name = accel_name(chosen.choice);
+    stats_.accel_reason = chosen.reason;
     stats_.accel_seconds = seconds_now() - start;
     stats_.accel = accel_->stats();
     stats_.scene_bytes = store_->bytes();

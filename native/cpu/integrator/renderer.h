@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cpu/accel/choice.h"
 #include "cpu/film.h"
 #include "cpu/integrator/batch.h"
 #include "cpu/integrator/render_scene.h"
@@ -22,7 +23,7 @@ struct RenderInput {
     int world_map_width = 0;  // of the importance map, 0: no map
     std::vector<Color> material_emission_estimate;
     bool light_tree = true;
-    AccelKind accel_kind = AccelKind::BVH;
+    AccelRequest accel;
     CameraView camera{};
     u32 frame_width = 0, frame_height = 0;  // pixels of the full frame
     PixelFilter filter{};
@@ -37,6 +38,7 @@ struct RenderInput {
 struct RenderStats {
     BatchCounts counts;
     AccelStats accel;
+    std::string accel_name, accel_reason;
     double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0;
     u64 scene_bytes = 0;
 };
