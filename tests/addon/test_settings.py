@@ -65,7 +65,7 @@ def test_a_pass_asked_of_cycles_is_delivered_by_luch(scene: bpy.types.Scene) -> 
 
 
 def test_every_structure_and_precision_that_blender_offers_renders(scene: bpy.types.Scene) -> None:
-    items = bpy.types.LuchSceneSettings.bl_rna.properties
+    items: Any = scene.luch.bl_rna.properties
     offered = {item.identifier for item in items["accelerator"].enum_items}
     assert offered == {"AUTO", *KINDS} - {"CWBVH"}, "the compressed tree is for CUDA"
     assert {item.identifier for item in items["precision"].enum_items} == set(PRECISIONS)

@@ -14,6 +14,8 @@ std::unique_ptr<Structure> build_structure(StructureKind kind, const StructureIn
             return build_bvh2_stackless(input, pool);
         case StructureKind::KD_TREE:
             return build_kd_tree(input, pool);
+        case StructureKind::CWBVH:
+            return build_cwbvh(input, pool);
         default:
             throw std::invalid_argument("This structure is not in this build.");
     }

@@ -47,14 +47,32 @@ inline constexpr float TWO_PI = 6.28318530717958647692f;
 inline constexpr float INFINITE_DISTANCE = __builtin_huge_valf();
 inline constexpr u32 NONE = 0xffffffffu;  // "no index" in every index field
 
-// Index of the lowest set bit; x must not be 0.
+// Index of the lowest and of the highest set bit; x must not be 0. The number of set bits.
+// fused: a b + c, rounded once. larger, smaller: a NaN in a gives b, which must not be NaN.
 #if LUCH_CUDA
 LUCH_FN int lowest_bit(u32 x) { return __ffs(static_cast<int>(x)) - 1; }
+LUCH_FN int highest_bit(u32 x) { return 31 - __clz(static_cast<int>(x)); }
+LUCH_FN int popcount(u32 x) { return __popc(x); }
+LUCH_FN float fused(float a, float b, float c) { return __fmaf_rn(a, b, c); }
+LUCH_FN float larger(float a, float b) { return fmaxf(a, b); }
+LUCH_FN float smaller(float a, float b) { return fminf(a, b); }
 #else
 LUCH_FN int lowest_bit(u32 x) { return __builtin_ctz(x); }
+LUCH_FN int highest_bit(u32 x) { return 31 - __builtin_clz(x); }
+LUCH_FN int popcount(u32 x) { return __builtin_popcount(x); }
+LUCH_FN float fused(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+LUCH_FN float larger(float a, float b) { return a > b ? a : b; }
+LUCH_FN float smaller(float a, float b) { return a < b ? a : b; }
 #endif
 
 LUCH_FN u32 float_bits(float x) { return __builtin_bit_cast(u32, x); }
 LUCH_FN float bits_float(u32 x) { return __builtin_bit_cast(float, x); }
+
+// 32768 + byte i of x, exactly: in one instruction on CUDA, where conversions are slow.
+#if LUCH_CUDA
+LUCH_FN float byte_above_32768(u32 x, u32 i) { return bits_float(__byte_perm(x, 0x47000000u, 0x7404u | i << 4)); }
+#else
+LUCH_FN float byte_above_32768(u32 x, u32 i) { return bits_float(0x47000000u | ((x >> (8 * i)) & 0xffu) << 8); }
+#endif
 
 }  // namespace luch

@@ -1,0 +1,76 @@
+// A ray against boxes whose planes are multiples of a power of two: what compressed wide trees compare.
+//
+// Distances are taken along the direction's dominant axis z, in the tree's own units: D = t |d_z|. A plane is
+// p + (32768 + q) s, q an integer in 0..255, s = 2^e; then D = (q + 32768) A + B with A = s r, B = (p - o) r and r
+// the reciprocal of the direction's slope: byte_above_32768() gives the first factor in one instruction.
+//
+// Rounding. A is exact. fl(p - o) and the fused product that makes B each err by EPS times |p - o| <= |plane - o| +
+// 33023 s, the last sum by EPS |D|: together 3 EPS of the distance and 2 EPS 33023 s < s / 254. The builder moves
+// every plane out by PLANE_MARGIN s = s / 128 before it rounds to the grid, outwards again; r carries the rest.
+//
+// The cone of math/bounds.h, 1: slope SHEAR_ERROR about the ray. r_near <= 1 / (|d| + slope) and r_far >= 1 / (|d| -
+// slope), d with |d_z| = 1, are taken from one reciprocal: 1 - x <= 1 / (1 + x), and 1 / (1 - x) <= 1 + 4/3 x for
+// x <= 1/4. An axis with |d| < 4 slope is as good as parallel: a hit strays from o there by at most 5 slope D, D <=
+// reach, the root's farthest corner. Take r = 2 / slope for both planes: the near distance is then at most 10 D and
+// the far one at least -10 D, so shifting them apart by 12 reach keeps every hit, and the widened slab is 6 slope reach.
+//
+// Overflow. Nodes wider than WIDEST have NaN for p: their children are always entered. In all others |plane - o| and
+// |p - o| are alike once a product overflows, so that the infinite distance is right.
+#pragma once
+#include "luch/geometry/box.h"
+#include "luch/geometry/ray.h"
+
+namespace luch {
+
+inline constexpr float PLANE_BIAS = 32768.0f;
+inline constexpr float PLANE_MARGIN = 1.0f / 128.0f;  // steps of the grid
+inline constexpr float WIDEST = 1e27f;  // extent of a node's box
+inline constexpr u32 SMALLEST_STEP = 20;  // biased exponents: 2^-107, so that A is no denormal,
+inline constexpr u32 LARGEST_STEP = 217;  // 2^90
+
+struct WideRay {
+    float origin[3];
+    float near_rdir[3], far_rdir[3];  // signed
+    float shift[3];  // by which near and far move apart: parallel axes only
+    float scale;  // D of t = 1
+    u32 octant;  // bit 2: x is negative, 1: y, 0: z
+    // Never below the distance of a hit at t.
+    LUCH_FN float upper(float t) const { return fused(t, scale * (1.0f + 4.0f * EPS), 1e-37f); }
+    LUCH_FN float lower(float t) const { return fused(t, scale * (1.0f - 4.0f * EPS), -1e-37f); }
+    LUCH_FN bool negative(int axis) const { return octant >> (2 - axis) & 1u; }
+};
+
+LUCH_FN WideRay make_wide_ray(const Ray& ray, const Box& root) {
+    WideRay out;
+    Vec3 extent = max_v(abs_v(root.lo - ray.origin), abs_v(root.hi - ray.origin));
+    float reach = max_component(extent);
+    out.scale = max_component(abs_v(ray.direction));
+    out.octant = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        float slope = abs_f(ray.direction[axis]) / out.scale;
+        float sign = copysign_f(1.0f, ray.direction[axis]);
+        bool parallel = slope < 4.0f * SHEAR_ERROR;
+        float reciprocal = 1.0f / (parallel ? 0.5f * SHEAR_ERROR : slope);
+        float x = parallel ? 0.0f : SHEAR_ERROR * reciprocal;
+        out.origin[axis] = ray.origin[axis];
+        out.near_rdir[axis] = sign * (reciprocal * (1.0f - x) * (1.0f - 16.0f * EPS));
+        out.far_rdir[axis] = sign * (reciprocal * (1.0f + 1.34f * x) * (1.0f + 16.0f * EPS));
+        out.shift[axis] = parallel ? 12.0f * reach : 0.0f;
+        out.octant |= (float_bits(ray.direction[axis]) >> 31) << (2 - axis);
+    }
+    return out;
+}
+
+// The three axes of one node's grid for one ray.
+struct WidePlanes {
+    float near_step[3], far_step[3], near_base[3], far_base[3];
+};
+LUCH_FN void prepare_axis(const WideRay& ray, int axis, float grid, u32 exponent, WidePlanes* out) {
+    float step = bits_float(exponent << 23), from = grid - ray.origin[axis];
+    out->near_step[axis] = step * ray.near_rdir[axis];
+    out->far_step[axis] = step * ray.far_rdir[axis];
+    out->near_base[axis] = fused(from, ray.near_rdir[axis], -ray.shift[axis]);
+    out->far_base[axis] = fused(from, ray.far_rdir[axis], ray.shift[axis]);
+}
+
+}  // namespace luch
