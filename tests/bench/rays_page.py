@@ -1,0 +1,78 @@
+"""The measured half of docs/rays.md: tables and a plot from the race's rows, between two marks in the page."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from luch.bench.rays import KINDS
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "rays.md"
+BEGIN, END = "<!-- race: begin -->", "<!-- race: end -->"
+
+
+def write_page(rows: list[dict[str, Any]], means: dict[str, dict[str, float]]) -> None:
+    """Replaces what stands between the marks. Raises ValueError if the page has none."""
+    text = PAGE.read_text(encoding="utf-8")
+    begin, end = text.index(BEGIN) + len(BEGIN), text.index(END)
+    body = "\n\n".join([_where(), *_tables(rows), _means(means), "![Mrays/s by structure](rays.png)"])
+    PAGE.write_text(text[:begin] + "\n" + body + "\n" + text[end:], encoding="utf-8")
+    _plot(rows)
+
+
+def _where() -> str:
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
+                            check=True).stdout.strip()  # fmt: skip
+    names = [line.partition(":")[2].strip() for line in Path("/proc/cpuinfo").read_text().splitlines()
+             if line.startswith("model name")]  # fmt: skip
+    return f"Measured on {names[0] if names else platform.processor()}, one thread, commit {commit}."
+
+
+def _tables(rows: list[dict[str, Any]]) -> list[str]:
+    tables = []
+    for mesh in dict.fromkeys(row["mesh"] for row in rows):
+        own = [row for row in rows if row["mesh"] == mesh]
+        lines = [f"**{mesh}**, {own[0]['triangles']:,} triangles", ""]
+        lines.append("| structure | " + " | ".join(f"{kind}, Mrays/s" for kind in KINDS)
+                     + " | build, ms/Mtri | bytes/triangle | nodes, tests of a diffuse ray |")  # fmt: skip
+        lines.append("|---|" + "---:|" * (len(KINDS) + 3))
+        for row in own:
+            work = f"{row['diffuse_nodes']:.1f}, {row['diffuse_tests']:.1f}" if "diffuse_nodes" in row else ""
+            lines.append(f"| {row['contestant']} | " + " | ".join(f"{row[kind]:.3g}" for kind in KINDS)
+                         + f" | {row['build_ms_per_mtri']:.0f} | {row['bytes_per_triangle']:.0f} | {work} |")  # fmt: skip
+        tables.append("\n".join(lines))
+    return tables
+
+
+def _means(means: dict[str, dict[str, float]]) -> str:
+    lines = ["Geometric means over the meshes (rates: above 1 the first is faster; build: below 1 it is):", ""]
+    lines.append("| | " + " | ".join([*KINDS, "build"]) + " |")
+    lines.append("|---|" + "---:|" * (len(KINDS) + 1))
+    lines += [
+        f"| {name} | " + " | ".join(f"{value:.2f}" for value in row.values()) + " |" for name, row in means.items()
+    ]
+    return "\n".join(lines)
+
+
+def _plot(rows: list[dict[str, Any]]) -> None:
+    """One panel a mesh, one bar a structure and kind of ray, logarithmic."""
+    meshes = list(dict.fromkeys(row["mesh"] for row in rows))
+    figure, axes = plt.subplots(1, len(meshes), figsize=(4.2 * len(meshes), 4.6), sharey=True, squeeze=False)
+    for axis, mesh in zip(axes[0], meshes, strict=True):
+        own = [row for row in rows if row["mesh"] == mesh][::-1]
+        for k, kind in enumerate(KINDS):
+            axis.barh([i - 0.2 * k for i in range(len(own))], [row[kind] for row in own], height=0.18, label=kind)
+        axis.set_yticks([i - 0.3 for i in range(len(own))], [row["contestant"] for row in own], fontsize=8)
+        axis.set_xscale("log")
+        axis.set_xlabel("Mrays/s, one thread")
+        axis.set_title(f"{mesh}, {own[0]['triangles']:,} triangles", fontsize=10)
+    axes[0][0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(PAGE.with_name("rays.png"), dpi=110)
