@@ -9,7 +9,7 @@ from native.test_accel import HARD_MESHES
 from numpy.typing import NDArray
 from support.accel_meshes import F32, Mesh, aimed_rays, icosphere, random_rays, rows, separate, soup
 
-KINDS: tuple[Kind, ...] = ("KD_TREE",)
+KINDS: tuple[Kind, ...] = ("KD_TREE", "GRID")
 RAYS = 2500
 EXTRA_MESHES: dict[str, Mesh] = {
     "cube of large triangles": separate(3 * np.random.default_rng(5).uniform(-1, 1, (60, 3, 3))),
@@ -180,3 +180,13 @@ def test_kd_tree_tests_few_primitives() -> None:
     counts = Accel(*mesh, kind="KD_TREE", threads=1).count(rays)
     assert counts["nodes"] <= 12 * len(rays)  # 10.4 measured, of 81,920 triangles
     assert counts["primitives"] <= 1.3 * len(rays)  # 1.11
+
+
+def test_grid_visits_few_cells_and_primitives() -> None:
+    mesh = icosphere(6)
+    rays = random_rays(5000)
+    accel = Accel(*mesh, kind="GRID", threads=1)
+    counts = accel.count(rays)
+    assert counts["nodes"] <= 10 * len(rays)  # 9.1 cells measured
+    assert counts["primitives"] <= 5 * len(rays)  # 4.1
+    assert accel.stats["references"] <= 3.5 * accel.stats["primitives"]  # 3.33

@@ -6,7 +6,7 @@
 // overlap, so the cell that holds Q is. All t here are what the primitive's test reports: the rdirs hold its rounding.
 // A cell that begins exactly at the best t is visited still: it may hold a smaller ref.
 #pragma once
-#include "luch/accel/primitives.h"
+#include "luch/accel/cell_refs.h"
 
 namespace luch {
 
@@ -84,19 +84,12 @@ struct KdShortStack {
     }
 };
 
-// Offers the refs of the cells along the ray, near to far, to leaf: bool leaf.offer(ref), true to end; leaf.limit(),
-// the t beyond which nothing counts.
+// Offers the refs of the cells along the ray, near to far, to leaf (cell_refs.h).
 template <class Stack, class Leaf, class Count>
 LUCH_FN void walk_kd_tree(const KdTree& tree, const Ray& ray, Leaf& leaf, Count& count) {
     BoxRay box = make_box_ray(ray.origin, ray.direction, tree.root);
     KdSpan root = {0, ray.t_min, leaf.limit(), KD_ROOT_PATH};
-    for (int axis = 0; axis < 3; ++axis) {
-        bool negative = box.negative[axis] != 0;
-        float lo = tree.root.lo[axis], hi = tree.root.hi[axis];
-        root.t0 = max_f(((negative ? hi : lo) - box.near_origin[axis]) * box.near_rdir[axis], root.t0);
-        root.t1 = min_f(((negative ? lo : hi) - box.far_origin[axis]) * box.far_rdir[axis], root.t1);
-    }
-    if (root.t0 > root.t1) return;
+    if (!clip_to_box(box, tree.root, &root.t0, &root.t1)) return;
     Stack stack;
     KdSpan at = root;
     do {
@@ -132,66 +125,19 @@ LUCH_FN void walk_kd_tree(const KdTree& tree, const Ray& ray, Leaf& leaf, Count&
         }
         if (!alive) continue;
         count.node(sizeof(KdNode), 0);
-        count.list(u32(sizeof(u32)) * node.value);
-        const u32* refs = tree.refs + (node.link >> 2);
-        for (u32 i = 0; i < node.value; ++i)
-            if (leaf.offer(refs[i])) return;
+        if (leaf.offer(tree.refs + (node.link >> 2), node.value)) return;
     } while (stack.pop(root, &at));
 }
 
-// A primitive stands in many cells: the last few that were tested are not tested again.
-template <u32 COUNT>
-struct Mailbox {
-    u32 tested[COUNT];
-    LUCH_FN Mailbox() {
-        for (u32 i = 0; i < COUNT; ++i) tested[i] = NONE;
-    }
-    LUCH_FN bool was_tested(u32 ref) {
-        u32& slot = tested[ref & (COUNT - 1)];
-        bool same = slot == ref;
-        slot = ref;
-        return same;
-    }
-};
-
-template <Precision P, class Count>
-struct ClosestLeaf {
-    const Primitives& all;
-    PrimitiveRay<P> ray;
-    float t_min;
-    RefHit* best;
-    Count& count;
-    Mailbox<8> mailbox;
-    LUCH_FN float limit() const { return best->t; }
-    LUCH_FN bool offer(u32 ref) {
-        if (!mailbox.was_tested(ref)) offer_primitive(all, ray, ref, t_min, best, count);
-        return false;
-    }
-};
-
-template <Precision P, class Count>
-struct AnyLeaf {
-    const Primitives& all;
-    PrimitiveRay<P> ray;
-    float t_min, t_max;
-    u8 blocked;
-    Count& count;
-    Mailbox<8> mailbox;
-    LUCH_FN float limit() const { return t_max; }
-    LUCH_FN bool offer(u32 ref) {
-        return !mailbox.was_tested(ref) && block_primitive(all, ray, ref, t_min, t_max, &blocked, count);
-    }
-};
-
 template <Precision P, class Stack = KdStack, class Count>
 LUCH_FN void closest_hit(const KdTree& tree, const Primitives& all, const Ray& ray, RefHit* best, Count& count) {
-    ClosestLeaf<P, Count> leaf = {all, PrimitiveRay<P>(ray), ray.t_min, best, count, {}};
+    ClosestInCell<P, Count> leaf = {all, PrimitiveRay<P>(ray), ray.t_min, best, count, {}};
     walk_kd_tree<Stack>(tree, ray, leaf, count);
 }
 
 template <Precision P, class Stack = KdStack, class Count>
 LUCH_FN u8 any_hit(const KdTree& tree, const Primitives& all, const Ray& ray, Count& count) {
-    AnyLeaf<P, Count> leaf = {all, PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count, {}};
+    AnyInCell<P, Count> leaf = {all, PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count, {}};
     walk_kd_tree<Stack>(tree, ray, leaf, count);
     return leaf.blocked;
 }
