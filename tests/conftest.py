@@ -3,9 +3,20 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 
 def pytest_report_header() -> list[str]:
     from luch import core
 
     return [f"luch core: {core.__name__} ({os.cpu_count()} processors)"]
+
+
+def pytest_collection_modifyitems(config: Any, items: list[Any]) -> None:
+    """Tests with the marker `cuda` are left out where CUDA cannot be used."""
+    from luch.cuda import available
+
+    marked = [item for item in items if item.get_closest_marker("cuda")]
+    if marked and not available():
+        config.hook.pytest_deselected(items=marked)
+        items[:] = [item for item in items if item not in marked]

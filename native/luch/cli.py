@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from luch import __version__, cryptomatte
+from luch.bench import device_rays
+from luch.cuda import DeviceError
 from luch.scene import Scene
 from luch.scenefile import read_scene
 
@@ -29,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         status: int = options.run(options)
-    except (OSError, ValueError, ImportError) as error:
+    except (OSError, ValueError, ImportError, DeviceError) as error:
         print(f"luch: {error}", file=sys.stderr)
         return 1
     return status
@@ -53,6 +55,12 @@ def _parser() -> argparse.ArgumentParser:
     info = commands.add_parser("info", help="say what is in a scene")
     info.add_argument("scene", type=Path, help="a .luch file")
     info.set_defaults(run=_info)
+
+    bench = commands.add_parser("bench", help="races of the core alone")
+    races = bench.add_subparsers(required=True, metavar="RACE")
+    rays = races.add_parser("rays", help="bare rays through every structure, on a GPU")
+    rays.set_defaults(run=_bench_rays)
+    device_rays.add_arguments(rays)
     return parser
 
 
@@ -169,6 +177,10 @@ class _Line:
     @staticmethod
     def _write(text: str) -> None:
         print(f"\r{text:70}", end="", file=sys.stderr, flush=True)
+
+
+def _bench_rays(options: argparse.Namespace) -> int:
+    return device_rays.run(options)
 
 
 def _info(options: argparse.Namespace) -> int:

@@ -1,0 +1,176 @@
+"""On CUDA every structure gives the CPU's brute-force hits, bit for bit.
+
+Each test runs twice: on a GPU (marker `cuda`; tests/bench/records tells when last), and anywhere with the kernels'
+source run by fibers on the CPU, which proves their logic and the Python around them.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from luch.accel import Accel
+from luch.cuda import compiler, device
+from native.test_accel import HARD_MESHES
+from support import cuda_on_cpu
+from support.accel_meshes import Mesh, aimed_rays, random_rays, rows, soup
+
+KINDS = list(compiler.table()["modules"])
+FEW = ("soup", "needles", "identical", "duplicates", "one triangle", "points")  # meshes for the fibers, which are slow
+FIBERS, GPU = "fibers", "cuda"
+
+
+@pytest.fixture(scope="module", params=[FIBERS, pytest.param(GPU, marks=pytest.mark.cuda)])
+def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Where the kernels run."""
+    if request.param == GPU:
+        yield GPU
+        return
+    folder = tmp_path_factory.mktemp("kernels")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "cupy", cuda_on_cpu.fake_cupy())
+        patch.setattr(compiler, "AHEAD", folder)
+
+        def compiled(module: str, precision: str, architecture: int) -> bytes:
+            source = compiler.unit(module, precision)
+            return cuda_on_cpu.compile_module(source, folder, list(compiler.source_folders())).encode()
+
+        patch.setattr(compiler, "compiled", compiled)
+        _forget()
+        yield FIBERS
+    _forget()
+
+
+def _forget() -> None:
+    for cached in (device.cupy, device.available, compiler.load):
+        cached.cache_clear()
+
+
+def some_rays(mesh: Mesh, place: str) -> Any:
+    count = 10_000 if place == GPU else 150
+    rays = np.concatenate([random_rays(count), aimed_rays(mesh, count)])
+    rays[::7, 7] = np.linspace(0.1, 2, len(rays[::7]))  # some end early
+    rays[::11, 3] = 0.3
+    return rays
+
+
+def check_equal(ours: Any, truth: Any) -> None:
+    for name, a, b in zip(("t", "prim", "u", "v"), ours, truth, strict=True):
+        differ = np.flatnonzero(a.view(np.uint32) != b.view(np.uint32))
+        assert not len(differ), (
+            f"{name} of {len(differ)} rays, first {differ[0]}: {a[differ[0]]} against {b[differ[0]]}"
+        )
+
+
+@pytest.mark.parametrize("name", [n if n in FEW else pytest.param(n, marks=pytest.mark.cuda) for n in HARD_MESHES])
+@pytest.mark.parametrize("kind", KINDS)
+def test_hits_on_the_device_are_bit_equal_to_brute_force(place: str, kind: Any, name: str) -> None:
+    mesh = HARD_MESHES[name]
+    rays = some_rays(mesh, place)
+    oracle = Accel(*mesh, kind="BRUTE_FORCE")
+    ours = Accel(*mesh, kind=kind, device="CUDA")
+    check_equal(ours.closest(rays), oracle.closest(rays))
+    assert np.array_equal(ours.any(rays), oracle.any(rays))
+
+
+@pytest.mark.parametrize("precision", ["WATERTIGHT", "DOUBLE"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_spheres_transparency_and_bad_rays_are_as_on_the_cpu(place: str, kind: Any, precision: Any) -> None:
+    points, triangles = soup(40)
+    rng = np.random.default_rng(4)
+    spheres = np.concatenate([rng.uniform(-1, 1, (30, 3)), rng.uniform(-0.02, 0.2, (30, 1))], 1).astype(np.float32)
+    flags = rng.random(70) < 0.5
+    points[5], triangles[7, 1] = np.nan, 1_000_000
+    rays = some_rays((np.nan_to_num(points), soup(40)[1]), place)
+    rays[3, 4:7], rays[4, 0], rays[5, 7], rays[6, 3], rays[8, 3] = 0, np.nan, -1, np.nan, -5
+    options = {"spheres": spheres, "may_be_transparent": flags, "precision": precision}
+    oracle = Accel(points, triangles, kind="BRUTE_FORCE", **options)  # type: ignore[arg-type]
+    ours = Accel(points, triangles, kind=kind, device="CUDA", **options)  # type: ignore[arg-type]
+    check_equal(ours.closest(rays), oracle.closest(rays))
+    assert np.array_equal(ours.blocked(rays) != 0, oracle.blocked(rays) != 0)
+    opaque = Accel(points, triangles, kind=kind, device="CUDA", spheres=spheres)
+    assert set(np.unique(opaque.blocked(rays))) == {0, 1}
+
+
+@pytest.mark.parametrize("kernel", ["closest_tiled", "closest_reduced"])
+@pytest.mark.parametrize("count", [1, 127, 300])
+def test_each_mapping_of_brute_force_gives_the_same_hits(place: str, kernel: str, count: int) -> None:
+    mesh = soup(count)
+    spheres = np.array([[0, 0, 0, 0.4], [0.2, 0, 0, 0.4], [0, 0, 0, 0.4]], np.float32)
+    rays = some_rays(mesh, place)[: None if place == GPU else 150]
+    oracle = Accel(*mesh, kind="BRUTE_FORCE", spheres=spheres)
+    ours = Accel(*mesh, kind="BRUTE_FORCE", spheres=spheres, device="CUDA").on_device
+    check_equal(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_empty_mesh_and_no_rays_are_answered(place: str, kind: Any) -> None:
+    nothing = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)
+    ours = Accel(*nothing, kind=kind, device="CUDA")
+    assert (ours.closest(random_rays(10))[1] == -1).all()
+    assert not ours.any(random_rays(10)).any()
+    assert len(Accel(*soup(5), kind=kind, device="CUDA").closest(np.zeros((0, 8), np.float32))[0]) == 0
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "CWBVH"])
+def test_device_counts_the_work_that_the_cpu_counts(place: str, kind: Any) -> None:
+    mesh = soup(100)
+    rays = random_rays(5000 if place == GPU else 100)
+    ours, cpu = Accel(*mesh, kind=kind, device="CUDA"), Accel(*mesh, kind=kind)
+    assert ours.count(rays) == cpu.count(rays)
+    assert ours.count(rays, any_hit=True) == cpu.count(rays, any_hit=True)
+    assert ours.count(rays)["primitives"] > 0
+
+
+@pytest.mark.parametrize("scale", [1e-18, 1e18])
+@pytest.mark.parametrize("kind", KINDS)
+def test_hits_are_bit_equal_at_any_scale(place: str, kind: Any, scale: float) -> None:
+    points, triangles = soup(100)
+    mesh = ((points * np.float64(scale)).astype(np.float32), triangles)
+    rays = aimed_rays(mesh, 10_000 if place == GPU else 100)
+    check_equal(Accel(*mesh, kind=kind, device="CUDA").closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays))
+
+
+@pytest.mark.cuda
+def test_arrays_on_the_gpu_are_answered_there() -> None:
+    import cupy
+
+    accel = Accel(*soup(50), kind="BRUTE_FORCE", device="CUDA")
+    rays = random_rays(1000)
+    there = accel.closest(cupy.asarray(rays))
+    assert all(isinstance(array, cupy.ndarray) for array in there)
+    check_equal([array.get() for array in there], accel.closest(rays))
+    assert isinstance(accel.any(cupy.asarray(rays)), cupy.ndarray)
+    with pytest.raises(ValueError, match="lies on a GPU"):
+        Accel(*soup(50)).closest(cupy.asarray(rays))
+
+
+def test_missing_cupy_is_told_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cupy", None)
+    _forget()
+    with pytest.raises(device.DeviceError, match="pip install cupy"):
+        Accel(*soup(3), kind="BRUTE_FORCE", device="CUDA")
+    _forget()
+
+
+def test_key_of_a_kernel_covers_headers_and_flags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = compiler.ahead_name("BRUTE_FORCE", "WATERTIGHT", 90)
+    assert before != compiler.ahead_name("BRUTE_FORCE", "DOUBLE", 90)
+    assert before != compiler.ahead_name("BRUTE_FORCE", "WATERTIGHT", 80)
+    header = tmp_path / "include" / "luch" / "new.h"
+    header.parent.mkdir(parents=True)
+    header.write_text("// changed")
+    folders = compiler.source_folders()
+    monkeypatch.setattr(compiler, "source_folders", lambda: (*folders, tmp_path / "include"))
+    compiler._sources_hash.cache_clear()
+    assert compiler.ahead_name("BRUTE_FORCE", "WATERTIGHT", 90) != before
+    compiler._sources_hash.cache_clear()
+
+
+def test_rays_of_a_wrong_shape_raise_one_clear_error(place: str) -> None:
+    with pytest.raises(ValueError, match=r"rays has shape \(4, 6\)"):
+        Accel(*soup(3), kind="BRUTE_FORCE", device="CUDA").closest(rows(np.zeros((4, 3)), np.ones((4, 3)))[:, :6])

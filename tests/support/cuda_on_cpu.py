@@ -1,0 +1,120 @@
+"""Stands in for CuPy and a GPU: arrays are NumPy's, kernels are compiled by the C++ compiler and run as fibers.
+
+What it proves is the logic of kernels and of the Python around them, bit for bit; what it cannot: speed, races that
+need two blocks at once, and that NVRTC gives the same arithmetic.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import subprocess
+import types
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+HERE = Path(__file__).parent
+FLAGS = ["-std=gnu++20", "-O1", "-march=x86-64-v3", "-ffp-contract=off", "-shared", "-fPIC", "-w"]
+
+
+class _Memory:
+    def __init__(self, ptr: int) -> None:
+        self.ptr = ptr
+
+
+class Array(np.ndarray):  # type: ignore[type-arg]
+    """A NumPy array that answers as CuPy's do."""
+
+    @property
+    def data(self) -> Any:
+        return _Memory(self.__array_interface__["data"][0])
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        return dict(self.__array_interface__)
+
+    def get(self) -> Any:
+        return np.array(self)
+
+
+def _array(given: Any, dtype: Any = None) -> Any:
+    return np.array(given, dtype=dtype).view(Array)
+
+
+class _Event:
+    def record(self) -> None:
+        pass
+
+    def synchronize(self) -> None:
+        pass
+
+
+def compile_module(source: str, folder: Path, include: list[Path]) -> str:
+    """The kernels of one unit as a library: run_NAME(parameters, grid, block) beside each."""
+    names = sorted(set(re.findall(r"LUCH_KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", _reached(source, include[1]))))
+    assert names
+    runs = "".join(
+        f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
+        f"    cuda_on_cpu::launch(grid, block, [p] {{ {name}(*(LUCH_VIEW*)p[0], *(luch::Primitives*)p[1], "
+        "*(luch::RayBatch*)p[2]); });\n}\n"
+        for name in names
+    )
+    file = folder / f"unit_{abs(hash(source))}.cpp"
+    file.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n{source}{runs}')
+    library = file.with_suffix(".so")
+    folders = [f"-I{path}" for path in include]
+    subprocess.run(["c++", *FLAGS, *folders, str(file), "-o", str(library)], check=True)
+    return str(library)
+
+
+def _reached(source: str, kernels: Path) -> str:
+    """The source with the kernel files that it includes."""
+    text = source
+    for name in re.findall(r'#include "(rays/\w+\.cuh)"', source):
+        text += _reached((kernels / name).read_text(encoding="utf-8"), kernels)
+    return text
+
+
+def fake_cupy() -> Any:
+    """A module with what luch.cuda asks of CuPy."""
+    libraries: dict[int, ctypes.CDLL] = {}
+    functions: dict[int, Any] = {}
+
+    def module_load_data(image: bytes) -> int:
+        libraries[len(libraries) + 1] = ctypes.CDLL(image.decode())
+        return len(libraries)
+
+    def module_get_function(module: int, name: str) -> int:
+        function = getattr(libraries[module], f"run_{name}")
+        functions[len(functions) + 1] = function
+        return len(functions)
+
+    def launch_kernel(function: int, grid: int, gy: int, gz: int, block: int, by: int, bz: int, shared: int,
+                      stream: int, parameters: int, extra: int) -> None:  # fmt: skip
+        assert (gy, gz, by, bz, shared, stream, extra) == (1, 1, 1, 1, 0, 0, 0)
+        functions[function](ctypes.c_void_p(parameters), grid, block)
+
+    device = types.SimpleNamespace(
+        id=0, compute_capability="90", attributes={"MaxThreadsPerMultiProcessor": 2048, "MultiProcessorCount": 2}
+    )
+    driver = types.SimpleNamespace(
+        moduleLoadData=module_load_data, moduleGetFunction=module_get_function, launchKernel=launch_kernel,
+        funcGetAttribute=lambda attribute, function: 32,
+        occupancyMaxActiveBlocksPerMultiprocessor=lambda function, block, shared: 2,
+    )  # fmt: skip
+    properties = {"name": b"fibers", "multiProcessorCount": 2, "l2CacheSize": 0, "totalGlobalMem": 0}
+    runtime = types.SimpleNamespace(
+        free=lambda ptr: None, getDeviceCount=lambda: 1, getDeviceProperties=lambda i: properties, driverGetVersion=lambda: 0,
+        runtimeGetVersion=lambda: 0,
+    )  # fmt: skip
+    cuda = types.SimpleNamespace(
+        Device=lambda: device, driver=driver, runtime=runtime, get_current_stream=lambda: types.SimpleNamespace(ptr=0),
+        Event=_Event, get_elapsed_time=lambda a, b: 1.0,
+    )  # fmt: skip
+    return types.SimpleNamespace(
+        __version__="fibers", cuda=cuda, asarray=_array, ascontiguousarray=_array,
+        asnumpy=np.array, empty=lambda *a: np.full(*a[:1], 77, *a[1:]).view(Array),
+        zeros=lambda *a: np.zeros(*a).view(Array),
+    )  # fmt: skip
