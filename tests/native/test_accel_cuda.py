@@ -107,6 +107,16 @@ def test_each_mapping_of_brute_force_gives_the_same_hits(place: str, kernel: str
     check_equal(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
 
 
+@pytest.mark.parametrize(("kind", "kernel"), [("BVH2_STACKLESS", "closest_together"), ("CWBVH", "closest_simple")])
+@pytest.mark.parametrize("name", ["soup", "needles", "identical"])
+def test_other_kernels_of_a_structure_give_the_same_hits(place: str, kind: Any, kernel: str, name: str) -> None:
+    mesh = HARD_MESHES[name]
+    rays = some_rays(mesh, place)
+    ours = Accel(*mesh, kind=kind, device="CUDA").on_device
+    oracle = Accel(*mesh, kind="BRUTE_FORCE")
+    check_equal(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_empty_mesh_and_no_rays_are_answered(place: str, kind: Any) -> None:
     nothing = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)

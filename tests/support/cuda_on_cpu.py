@@ -53,7 +53,7 @@ class _Event:
 
 def compile_module(source: str, folder: Path, include: list[Path]) -> str:
     """The kernels of one unit as a library: run_NAME(parameters, grid, block) beside each."""
-    names = sorted(set(re.findall(r"LUCH_KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", _reached(source, include[1]))))
+    names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", _reached(source, include[1]))))
     assert names
     runs = "".join(
         f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'

@@ -3,7 +3,8 @@
 // The other two follow. All give the same hit: the smallest t and, on equal t, the smaller ref.
 #pragma once
 #include "luch/accel/brute_force.h"
-#include "rays/structure.cuh"
+#include "rays/block.cuh"
+#include "rays/generic.cuh"
 
 namespace luch {
 
@@ -60,19 +61,6 @@ __device__ __forceinline__ void trace_tiles(const BruteForce& list, const Primit
 // t is positive, so its bits sort as it does; a miss sorts last.
 __device__ __forceinline__ u64 sort_key(const RefHit& hit) {
     return hit.ref == NONE ? ~u64(0) : (u64(float_bits(hit.t)) << 32 | hit.ref);
-}
-
-// The least key of the block, for every thread of it.
-__device__ __forceinline__ u64 block_min(u64 key) {
-    __shared__ u64 least[RAY_BLOCK / 32];
-    for (int step = 16; step > 0; step >>= 1) {
-        u64 other = __shfl_xor_sync(0xffffffffu, key, step);
-        key = other < key ? other : key;
-    }
-    if (threadIdx.x % 32 == 0) least[threadIdx.x / 32] = key;
-    __syncthreads();
-    for (int warp = 0; warp < RAY_BLOCK / 32; ++warp) key = least[warp] < key ? least[warp] : key;
-    return key;
 }
 
 // Shared ray, own triangles: one block a ray, then a min-reduction over (t, ref).

@@ -1,5 +1,4 @@
-// One thread a ray through any structure, by the functions that the CPU runs. The unit that includes this names
-// LUCH_VIEW (the view struct), LUCH_PRECISION (a Precision) and the view's header before it.
+// One thread a ray through any structure, by the functions that the CPU runs: templates for kernels.
 #pragma once
 #include "rays/batch.cuh"
 
@@ -34,14 +33,3 @@ __device__ __forceinline__ void trace_any(const View& view, const Primitives& al
 
 #define LUCH_KERNEL(name) extern "C" __global__ void __launch_bounds__(luch::RAY_BLOCK) name
 #define LUCH_ARGUMENTS const LUCH_VIEW view, const luch::Primitives all, const luch::RayBatch batch
-
-LUCH_KERNEL(closest)(LUCH_ARGUMENTS) {
-    luch::trace_closest<LUCH_VIEW, LUCH_PRECISION, luch::NoCounters>(view, all, batch);
-}
-LUCH_KERNEL(closest_counted)(LUCH_ARGUMENTS) {
-    luch::trace_closest<LUCH_VIEW, LUCH_PRECISION, luch::Counters>(view, all, batch);
-}
-LUCH_KERNEL(any)(LUCH_ARGUMENTS) { luch::trace_any<LUCH_VIEW, LUCH_PRECISION, luch::NoCounters>(view, all, batch); }
-LUCH_KERNEL(any_counted)(LUCH_ARGUMENTS) {
-    luch::trace_any<LUCH_VIEW, LUCH_PRECISION, luch::Counters>(view, all, batch);
-}

@@ -94,6 +94,7 @@ class Kernel:
 
     def __init__(self, name: str, function: int) -> None:
         self.name, self._function = name, function
+        self._resident: dict[int, int] = {}
 
     def launch(self, grid: int, block: int, arguments: list[bytes], shared_bytes: int = 0) -> None:
         """Puts it on CuPy's current stream. Each argument is the memory of one parameter, as C++ lays it out."""
@@ -106,6 +107,13 @@ class Kernel:
         driver.launchKernel(
             self._function, grid, 1, 1, block, 1, 1, shared_bytes, stream, ctypes.addressof(pointers), 0
         )
+
+    def resident_blocks(self, block: int) -> int:
+        """How many blocks of that many threads run at once on the whole device."""
+        if block not in self._resident:
+            fit = cupy().cuda.driver.occupancyMaxActiveBlocksPerMultiprocessor(self._function, block, 0)
+            self._resident[block] = fit * cupy().cuda.Device().attributes["MultiProcessorCount"]
+        return self._resident[block]
 
     def properties(self, block: int, shared_bytes: int = 0) -> dict[str, float]:
         """Registers a thread, local and shared bytes, and the part of a multiprocessor's threads that fit (occupancy)."""

@@ -13,6 +13,7 @@ from luch.cuda.device import Kernel, cupy, is_device_array
 
 BLOCK = 128  # RAY_BLOCK of rays/structure.cuh
 OWN_PRIMITIVES = ("CWBVH",)  # their leaves hold the primitives
+PERSISTENT = {("CWBVH", "closest"), ("CWBVH", "any")}  # as many blocks as fit at once, which fetch their rays
 COUNTERS = ("nodes", "boxes", "primitives", "bytes")
 
 
@@ -41,18 +42,16 @@ class DeviceStructure:
         cp, count = cupy(), len(rays)
         t, u, v = (cp.empty(count, np.float32) for _ in range(3))
         prim, counters = cp.empty(count, np.int32), cp.zeros(4, np.uint64)
-        there = cp.asarray(rays)
-        batch = pack_batch(there, t=t, prim=prim, u=u, v=v, counters=counters)
-        self.launch(kernel + "_counted" * counted, precision, batch, count)
+        arrays = {"t": t, "prim": prim, "u": u, "v": v, "counters": counters}
+        self.launch(kernel + "_counted" * counted, precision, cp.asarray(rays), arrays)
         return (*_like(rays, t, prim, u, v), named_counts(counters) if counted else {})
 
     def any(self, rays: Any, precision: str, counted: bool) -> tuple[Any, ...]:
         """rays: as above. Blocked values, and a dictionary of counts."""
         cp, count = cupy(), len(rays)
         blocked, counters = cp.empty(count, np.uint8), cp.zeros(4, np.uint64)
-        there = cp.asarray(rays)
-        batch = pack_batch(there, blocked=blocked, counters=counters)
-        self.launch("any" + "_counted" * counted, precision, batch, count)
+        arrays = {"blocked": blocked, "counters": counters}
+        self.launch("any" + "_counted" * counted, precision, cp.asarray(rays), arrays)
         return (*_like(rays, blocked), named_counts(counters) if counted else {})
 
     def kernel(self, name: str, precision: str) -> Kernel:
@@ -64,17 +63,20 @@ class DeviceStructure:
         cp, count = cupy(), len(rays)
         arrays = {key: cp.empty(count, np.float32) for key in ("t", "prim", "u", "v")}
         arrays |= {"blocked": cp.empty(count, np.uint8), "counters": cp.zeros(4, np.uint64)}
-        batch = pack_batch(rays, **arrays)
 
-        def run(_keep: object = arrays) -> None:
-            self.launch(name, precision, batch, count)
+        def run() -> None:
+            self.launch(name, precision, rays, arrays)
 
         return run
 
-    def launch(self, name: str, precision: str, batch: bytes, count: int) -> None:
-        """Traces count rays; nothing is waited for."""
+    def launch(self, name: str, precision: str, rays: Any, arrays: dict[str, Any]) -> None:
+        """Traces the rays; nothing is waited for."""
+        count, kernel = len(rays), self.kernel(name, precision)
         grid = count if name == "closest_reduced" else -(-count // BLOCK)
-        self.kernel(name, precision).launch(grid, BLOCK, [self._view, self._primitives, batch])
+        if (self.kind, name) in PERSISTENT:
+            arrays = {**arrays, "next": cupy().zeros(1, np.uint32)}
+            grid = min(grid, kernel.resident_blocks(BLOCK))
+        kernel.launch(grid, BLOCK, [self._view, self._primitives, pack_batch(rays, **arrays)])
 
     @property
     def source_bytes(self) -> int:
