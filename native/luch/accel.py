@@ -127,7 +127,10 @@ class Accel:
     def blocked(self, rays: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         """What lies in each ray's interval: 0 nothing, 1 something opaque, 2 only what may be transparent."""
         given = self._rays(rays)
-        found = [] if self._wide is None else [self._wide.any(given, _ALL_KINDS)]
+        if self._wide is None:
+            result: npt.NDArray[np.uint8] = self._structure.any(given, self._precision, False)[0]
+            return result
+        found = [self._wide.any(given, _ALL_KINDS)]
         if self._structure is not None:
             found.append(self._structure.any(given, self._precision, False)[0])
         opaque = np.any([each == 1 for each in found], axis=0)
