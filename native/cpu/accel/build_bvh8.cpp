@@ -21,6 +21,15 @@ void* allocate_huge(size_t bytes) {
     return data;
 }
 
+void set_empty_slot(Node8& node, int slot) {
+    for (int axis = 0; axis < 3; ++axis) {
+        node.bounds[axis][slot] = INFINITE_DISTANCE;
+        node.bounds[axis + 3][slot] = -INFINITE_DISTANCE;
+    }
+    node.child[slot] = LEAF;
+    node.count[slot] = 0;
+}
+
 namespace {
 
 constexpr size_t TASK_PRIMITIVES = 16384;  // smaller sets are built by one thread each
@@ -38,15 +47,6 @@ struct Task {
     u32 parent_node, slot;
     std::vector<Node8> nodes;
 };
-
-void set_empty(Node8& node, int slot) {
-    for (int axis = 0; axis < 3; ++axis) {
-        node.bounds[axis][slot] = INFINITE_DISTANCE;
-        node.bounds[axis + 3][slot] = -INFINITE_DISTANCE;
-    }
-    node.child[slot] = LEAF;
-    node.count[slot] = 0;
-}
 
 void set_bounds(Node8& node, int slot, const PrimSet& set) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -93,7 +93,7 @@ class Builder {
         int order[8];
         sort_by_area(children, count, order);
         Node8 node;
-        for (int i = 0; i < 8; ++i) set_empty(node, i);
+        for (int i = 0; i < 8; ++i) set_empty_slot(node, i);
         for (int i = 0; i < count; ++i) {
             const Child& child = children[order[i]];
             set_bounds(node, i, child.set);

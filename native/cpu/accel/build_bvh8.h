@@ -25,6 +25,12 @@ struct Tree8 {
     Box root;
 };
 
+// The same from a binary tree, cut at the least expected cost. Refs repeat where its builder split triangles.
+struct Tree2;
+Tree8 collapse_bvh8(const Tree2& tree, u32 leaf_width, ThreadPool& pool);
+
+void set_empty_slot(Node8& node, int slot);
+
 // leaf_width: primitives that cost one test together (4 for triangle blocks, 1 for instances). A leaf holds
 // at most LEAF_MAX_ITEMS * leaf_width. boxes is consumed as scratch. count >= 1; every box finite.
 Tree8 build_bvh8(HugeArray<PrimBox> boxes, size_t count, u32 leaf_width, ThreadPool& pool);

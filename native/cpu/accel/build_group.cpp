@@ -6,6 +6,7 @@
 #include "cpu/accel/accel.h"
 #include "cpu/accel/build_bvh8.h"
 #include "cpu/accel/group.h"
+#include "cpu/accel/tree2.h"
 
 namespace luch::cpu {
 namespace {
@@ -125,12 +126,13 @@ void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gath
     });
 }
 
-// The triangles kept, side by side in order of ref, and the structure over them.
-void make_structure(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, const AccelChoice& choice,
-                    ThreadPool& pool) {
+// The triangles kept, side by side in order of ref: what builders take.
+StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, BuildQuality quality,
+                       std::vector<u32>* refs_kept, ThreadPool& pool) {
     u32 ref_count = gather.ref_count();
     group.corners.assign(9 * size_t(ref_count), 0.0f);
-    std::vector<u32> refs(kept);
+    std::vector<u32>& refs = *refs_kept;
+    refs.resize(kept);
     pool.parallel_for(kept, GATHER_CHUNK, [&](size_t begin, size_t end, unsigned) {
         for (size_t i = begin; i < end; ++i) {
             u32 ref = refs[i] = boxes[i].id;
@@ -145,7 +147,25 @@ void make_structure(Group& group, const PrimBox* boxes, size_t kept, const Gathe
         group.flags[ref] = PRIMITIVE_MAY_BE_TRANSPARENT;
     }
     Primitives all = {group.corners.data(), nullptr, group.flags.empty() ? nullptr : group.flags.data(), ref_count, 0};
-    group.structure = build_structure(choice.kind, {all, refs.data(), u32(kept), choice.quality}, pool);
+    return {all, refs.data(), u32(kept), quality};
+}
+
+void make_structure(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, const AccelChoice& choice,
+                    ThreadPool& pool) {
+    std::vector<u32> refs;
+    StructureInput input = collect(group, boxes, kept, gather, choice.quality, &refs, pool);
+    group.structure = build_structure(choice.kind, input, pool);
+}
+
+// The wide tree by a binary builder of the quality asked for.
+Tree8 collapse_tree(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, const AccelChoice& choice,
+                    ThreadPool& pool) {
+    std::vector<u32> refs;
+    StructureInput input = collect(group, boxes, kept, gather, choice.quality, &refs, pool);
+    Tree8 tree = collapse_bvh8(build_tree2(input, 4, pool), 4, pool);
+    group.corners = {};
+    group.flags = {};
+    return tree;
 }
 
 }  // namespace
@@ -172,7 +192,9 @@ void build_group(Group& group, const SceneView& scene, const std::vector<std::ve
                                 {boxes[i].hi[0], boxes[i].hi[1], boxes[i].hi[2]}});
         return make_structure(group, boxes.data(), kept, gather, choice, pool);
     }
-    Tree8 tree = build_bvh8(std::move(boxes), kept, 4, pool);
+    Tree8 tree = choice.quality == BuildQuality::NORMAL
+                     ? build_bvh8(std::move(boxes), kept, 4, pool)
+                     : collapse_tree(group, boxes.data(), kept, gather, choice, pool);
     group.nodes = std::move(tree.nodes);
     group.root = tree.root;
     make_blocks(group, tree.order, gather, pool);

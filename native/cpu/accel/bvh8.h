@@ -20,7 +20,7 @@ constexpr u32 LEAF_FIRST_MASK = (1u << LEAF_COUNT_SHIFT) - 1;
 LUCH_FN u32 leaf_first(u32 leaf) { return leaf & LEAF_FIRST_MASK; }
 LUCH_FN u32 leaf_items(u32 leaf) { return ((leaf >> LEAF_COUNT_SHIFT) & (LEAF_MAX_ITEMS - 1)) + 1; }
 
-constexpr u32 MAX_DEPTH = 64;                        // wide levels; the builder halves sets below HALVING_DEPTH
+constexpr u32 MAX_DEPTH = 96;                        // wide levels; the builder halves sets below HALVING_DEPTH
 constexpr u32 HALVING_DEPTH = 48;                    // 16 levels of halving by 8 hold 2^48 triangles
 constexpr u32 STACK_SIZE = MAX_DEPTH * 7 + 16;       // every level leaves seven siblings; 16: slack of wide stores
 

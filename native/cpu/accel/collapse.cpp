@@ -53,7 +53,7 @@ void Collapse::solve(u32 node) {
     if (n.count != 0) {
         best.primitives = n.count;
         best.leaf = true;
-        std::fill_n(best.cost, 7, area * float(n.count) * costs_.primitive);
+        std::fill_n(best.cost, 7, area * leaf_cost(n.count));
         return;
     }
     const Best &l = best_[n.child], &r = best_[n.child + 1];
@@ -76,7 +76,7 @@ void Collapse::solve(u32 node) {
     best.left[7] = from_left[8];
     best.cost[0] = inner;
     if (best.primitives <= costs_.max_leaf) {
-        float as_leaf = area * float(best.primitives) * costs_.primitive;
+        float as_leaf = area * leaf_cost(best.primitives);
         best.leaf = as_leaf <= inner;
         best.cost[0] = std::min(as_leaf, inner);
     }

@@ -17,6 +17,7 @@ class Collapse {
     struct Costs {
         float node, primitive;  // of a visit and of a test
         u32 max_leaf;           // primitives; the tree's own leaves hold no more
+        u32 leaf_width = 1;     // primitives that cost one test together
     };
     Collapse(const Tree2& tree, const Costs& costs, ThreadPool& pool);
 
@@ -32,6 +33,9 @@ class Collapse {
         bool leaf;  // as one tree: a leaf
         u32 primitives;  // below
     };
+    float leaf_cost(u32 primitives) const {
+        return float((primitives + costs_.leaf_width - 1) / costs_.leaf_width) * costs_.primitive;
+    }
     void solve(u32 node);
     void solve_below(u32 node);
     void gather(u32 node, u32 most, WideChild* out, int* count) const;
