@@ -125,7 +125,7 @@ class ArrayStructure {
             if (index[k] >= vertex_count) return false;
             std::copy_n(positions + 3 * size_t(index[k]), 3, corners + 3 * k);
         }
-        return usable(corners, 9);
+        return usable(corners, 9) && triangle_has_area(vec3_of(corners), vec3_of(corners + 3), vec3_of(corners + 6));
     }
     static py::dict counts(const Counters& total) {
         py::dict out;

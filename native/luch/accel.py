@@ -41,7 +41,7 @@ class Accel:
     may_be_transparent: (T + S,) bool, for `blocked`. threads: 0 is all processors. device: "CUDA" takes rays from
     NumPy or from the GPU (CuPy) and answers in kind; "BVH" is there the compressed eight-wide tree ("CWBVH"); the
     structure is built on the CPU and uploaded. Primitives with a number that is not finite, with an index outside the
-    mesh or of no radius are dropped and counted in `stats`. Raises ValueError on wrong shapes or types,
+    mesh or of no area or no radius are dropped and counted in `stats`. Raises ValueError on wrong shapes or types,
     luch.cuda.DeviceError where CUDA cannot be used.
     """
 

@@ -16,7 +16,7 @@ struct AccelStats {
     u64 triangles = 0;          // kept, counted once per mesh (once per instance where meshes are merged)
     u64 nodes = 0, leaf_blocks = 0;
     u64 bytes = 0;              // nodes, leaf blocks and tables
-    u64 dropped_triangles = 0;  // a vertex is not finite or its index lies outside the mesh
+    u64 dropped_triangles = 0;  // a vertex is not finite, its index lies outside the mesh, or there is no area
     double build_seconds = 0.0;
 };
 

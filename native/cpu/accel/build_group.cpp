@@ -27,7 +27,7 @@ class Gather {
         const Member& last = group_.members.back();
         return last.first_ref + scene_.meshes[last.mesh].triangle_count;
     }
-    // False for a triangle that cannot be traced: an index outside the mesh, a vertex that is not finite.
+    // False for a triangle that cannot be traced: an index outside the mesh, a vertex that is not finite, no area.
     bool read(u32 ref, const Member& member, Corners3* out) const {
         const MeshView& mesh = scene_.meshes[member.mesh];
         const u32* indices = scene_.triangles + 3 * (size_t(mesh.first_triangle) + ref - member.first_ref);
@@ -39,7 +39,7 @@ class Gather {
             if (!(max_component(abs_v(point)) <= 1e37f) || !finite_v(point)) return false;
             out->p[k] = point;
         }
-        return true;
+        return triangle_has_area(out->p[0], out->p[1], out->p[2]);
     }
     u32 flagged(u32 ref, const Member& member) const {
         if (flags_.empty() || flags_[member.mesh].empty()) return ref;

@@ -41,6 +41,14 @@ LUCH_FN TriangleRay make_triangle_ray(Vec3 origin, Vec3 direction) {
     return r;
 }
 
+// False for a triangle that is a line or a point: no ray should meet it, and its rounded edges might. Differences of
+// floats and their products are exact in double (but for coordinates 2^28 apart in size, whose triangle is a needle).
+LUCH_FN bool triangle_has_area(Vec3 p0, Vec3 p1, Vec3 p2) {
+    double ax = double(p1.x) - double(p0.x), ay = double(p1.y) - double(p0.y), az = double(p1.z) - double(p0.z);
+    double bx = double(p2.x) - double(p0.x), by = double(p2.y) - double(p0.y), bz = double(p2.z) - double(p0.z);
+    return ay * bz != az * by || az * bx != ax * bz || ax * by != ay * bx;
+}
+
 // False for rays that can hit nothing: not finite, no direction, an empty or NaN interval.
 LUCH_FN bool ray_is_valid(const Ray& ray) {
     Vec3 a = abs_v(ray.direction);
