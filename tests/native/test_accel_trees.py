@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from luch.accel import Accel, Kind, Quality
+from luch.accel import QUALITIES, Accel, Kind, Quality
 from support.accel_meshes import F32, Mesh, aimed_rays, cube, icosphere, random_rays, rows, separate, slivers, soup
 
-RAYS = 1200  # of each sort
-TREES: list[tuple[Kind, Quality]] = [("BVH2", "NORMAL"), ("BVH2_STACKLESS", "NORMAL"), ("CWBVH", "NORMAL")]
+RAYS = 800  # of each sort
+KINDS: tuple[Kind, ...] = ("BVH2", "BVH2_STACKLESS", "CWBVH")
+TREES = [(kind, quality) for kind in KINDS for quality in QUALITIES]
 every_tree = pytest.mark.parametrize(("kind", "quality"), TREES, ids=[f"{k}-{q}" for k, q in TREES])
 ONE_EACH = [tree for tree in TREES if tree[1] == "NORMAL"]
 every_kind = pytest.mark.parametrize(("kind", "quality"), ONE_EACH, ids=[k for k, _ in ONE_EACH])
@@ -92,7 +93,7 @@ def test_tree_hits_are_bit_equal_to_brute_force(name: str, kind: Kind, quality: 
     rays, expected = truth(name)
     tree = Accel(*MESHES[name], kind=kind, quality=quality)
     assert bits_differ((*tree.closest(rays), tree.blocked(rays)), expected) == 0
-    assert (expected[1] >= 0).sum() > 1000 or name in ("collinear", "points"), "these rays prove nothing"
+    assert (expected[1] >= 0).sum() > 600 or name in ("collinear", "points"), "these rays prove nothing"
 
 
 @every_tree
