@@ -22,6 +22,7 @@ from luch.cuda.structures import BLOCK
 BRUTE_RAYS = 1 << 17  # every primitive in turn: few rays, and one mesh
 BRUTE_MESH = "arcade"
 MAPPINGS = {"closest": 100, "closest_tiled": 130, "closest_reduced": "40-50"}  # the lecture's per cent
+OTHERS = {"BVH2_STACKLESS": {"together": "closest_together"}, "CWBVH": {"simple": "closest_simple"}}  # further kernels
 SLOWEST = 0.3  # s a launch; a structure that takes longer traces a part of the rays
 
 
@@ -88,6 +89,14 @@ def rows_of(
             row = measure(accel, precision, "any" if ray_kind == "shadow" else "closest", rays, options.repeats)
             row["differ"] = differing(accel, precision, ray_kind, rays, truth[ray_kind])
             rows.append(shared | {"precision": precision, "rays": ray_kind} | row)
+        for name, kernel in OTHERS.get(kind, {}).items():
+            for ray_kind in KINDS:
+                if ray_kind == "shadow":
+                    continue
+                row = measure(accel, precision, kernel, sets[ray_kind], options.repeats)
+                row["differ"] = differing(accel, precision, ray_kind, sets[ray_kind], truth[ray_kind], kernel)
+                named = {"structure": f"{kind} {name}", "precision": precision, "rays": ray_kind}
+                rows.append(shared | named | row)
     return rows
 
 
@@ -113,7 +122,7 @@ def measure(accel: Accel, precision: str, kernel: str, rays: Any, repeats: int) 
     }
 
 
-def differing(accel: Accel, precision: str, ray_kind: str, rays: Any, truth: Any) -> int:
+def differing(accel: Accel, precision: str, ray_kind: str, rays: Any, truth: Any, kernel: str = "closest") -> int:
     """Rays whose result differs from the CPU's in any bit. FAST and DOUBLE have other roundings: none is expected."""
     if precision != "WATERTIGHT" or not len(rays):
         return 0
@@ -121,7 +130,8 @@ def differing(accel: Accel, precision: str, ray_kind: str, rays: Any, truth: Any
     if ray_kind == "shadow":
         return int((accel.any(part) != truth[: len(part)]).sum())
     differ = np.zeros(len(part), bool)
-    for ours, theirs in zip(accel.closest(part), truth, strict=True):
+    found = accel.on_device.closest(part, precision, False, kernel)[:4]
+    for ours, theirs in zip(found, truth, strict=True):
         differ |= ours.view(np.uint32) != theirs[: len(part)].view(np.uint32)
     return int(differ.sum())
 
@@ -154,12 +164,12 @@ def commit() -> str:
 
 
 def _heading() -> str:
-    return (f"{'mesh':10} {'structure':18} {'precision':10} {'rays':8} {'Mrays/s':>9} {'nodes':>7} {'boxes':>7} {'tests':>7} "
+    return (f"{'mesh':10} {'structure':23} {'precision':10} {'rays':8} {'Mrays/s':>9} {'nodes':>7} {'boxes':>7} {'tests':>7} "
             f"{'regs':>4} {'local':>5} {'shared':>6} {'occ':>4} {'ms/Mtri':>8} {'B/tri':>6} differ")  # fmt: skip
 
 
 def _line(row: dict[str, Any]) -> str:
-    return (f"{row['mesh']:10} {row['structure']:18} {row['precision']:10} {row['rays']:8} {row['mrays_per_s']:9.2f} "
+    return (f"{row['mesh']:10} {row['structure']:23} {row['precision']:10} {row['rays']:8} {row['mrays_per_s']:9.2f} "
             f"{row['nodes']:7.1f} {row['boxes']:7.1f} {row['primitives']:7.1f} {row['registers']:4.0f} "
             f"{row['local_bytes']:5.0f} {row['shared_bytes']:6.0f} {row['occupancy']:4.2f} "
             f"{row['build_ms_per_mtri']:8.1f} {row['bytes_per_triangle']:6.1f} {row['differ']}")  # fmt: skip
