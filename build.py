@@ -38,6 +38,8 @@ def _parser() -> argparse.ArgumentParser:
         "--sanitize", action="store_true", help="with AddressSanitizer and UBSan, in a folder of its own"
     )
 
+    build.add_argument("--cuda", action="store_true", help="CUDA kernels too, for all architectures; needs nvcc")
+
     render = add("render", "Render a .blend file, or the demo scene, with Luch inside Blender.")
     render.add_argument("file", nargs="?", help="a .blend file (default: the demo scene, built by its script)")
     render.add_argument("--samples", type=int, help="samples per pixel (default: the file's; the demo: 64)")

@@ -10,6 +10,7 @@ from typing import List
 
 from buildtools.compile_core import compile_core, compile_sanitized
 from buildtools.failure import BuildFailure
+from buildtools.kernels import AHEAD, place_kernels
 from buildtools.places import DIST, NATIVE, OUT, ROOT, VENV, VENV_PYTHON
 from buildtools.run import output, status
 from buildtools.setup_venv import ensure_environment
@@ -31,6 +32,8 @@ def setup(arguments: Arguments) -> int:
 def build(arguments: Arguments) -> int:
     ensure_environment()
     compile_core(arguments.isa, arguments.jobs)
+    if arguments.cuda:
+        place_kernels()
     return 0
 
 
@@ -105,7 +108,7 @@ def package(arguments: Arguments) -> int:
 
 
 def clean(arguments: Arguments) -> int:
-    folders = [*ROOT.glob(".build*"), OUT, DIST, *([VENV] if arguments.all else [])]
+    folders = [*ROOT.glob(".build*"), OUT, DIST, AHEAD, *([VENV] if arguments.all else [])]
     caches = [ROOT / ".pytest_cache", ROOT / ".mypy_cache", ROOT / ".ruff_cache", *ROOT.glob("*/**/__pycache__")]
     for path in folders + [cache for cache in caches if VENV not in cache.parents]:
         shutil.rmtree(path, ignore_errors=True)

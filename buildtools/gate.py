@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Callable, List, Tuple
 
 from buildtools.failure import BuildFailure
+from buildtools.kernels import check_kernels
 from buildtools.places import BUILD, NATIVE, ROOT, VENV_PYTHON, tool
 from buildtools.run import require
 
@@ -105,4 +106,5 @@ CHECKS: List[Tuple[str, Callable[[], None]]] = [
     ("types: mypy --strict", _types),
     ("headers alone: c++", _headers_alone),
     ("headers alone: nvcc", _headers_cuda),
+    ("kernels: nvcc, every architecture", check_kernels),
 ]

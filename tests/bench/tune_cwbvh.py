@@ -41,13 +41,12 @@ VARIANTS: dict[str, dict[str, int]] = {
     "stack: 4 shared": {"SHARED_ENTRIES": 4},
     "stack: 12 shared": {"SHARED_ENTRIES": 12},
 }
-PLAIN_UNIT = compiler.unit
+PLAIN_FLAGS = compiler.flags
 
 
 def set_variant(defines: dict[str, int]) -> None:
     """The next kernels are compiled with these."""
-    lines = "".join(f"#define LUCH_{name} {value}\n" for name, value in defines.items())
-    compiler.unit = lambda module, precision: lines + PLAIN_UNIT(module, precision)
+    compiler.flags = lambda precision: [*PLAIN_FLAGS(precision), *(f"-DLUCH_{k}={v}" for k, v in defines.items())]
     compiler.load.cache_clear()
 
 

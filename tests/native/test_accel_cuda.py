@@ -19,6 +19,8 @@ from native.test_accel import HARD_MESHES
 from support import cuda_on_cpu
 from support.accel_meshes import Mesh, aimed_rays, random_rays, rows, soup
 
+from buildtools.kernels import faults
+
 KINDS = list(compiler.table()["modules"])
 FEW = ("soup", "needles", "identical", "duplicates", "one triangle", "points")  # meshes for the fibers, which are slow
 FIBERS, GPU = "fibers", "cuda"
@@ -36,8 +38,8 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         patch.setattr(compiler, "AHEAD", folder)
 
         def compiled(module: str, precision: str, architecture: int) -> bytes:
-            source = compiler.unit(module, precision)
-            return cuda_on_cpu.compile_module(source, folder, list(compiler.source_folders())).encode()
+            source = compiler.source_folders()[1] / compiler.table()["modules"][module]
+            return cuda_on_cpu.compile_module(source, precision, folder, list(compiler.source_folders())).encode()
 
         patch.setattr(compiler, "compiled", compiled)
         _forget()
@@ -77,8 +79,9 @@ def test_hits_on_the_device_are_bit_equal_to_brute_force(place: str, kind: Any, 
     assert np.array_equal(ours.any(rays), oracle.any(rays))
 
 
-@pytest.mark.parametrize("precision", ["WATERTIGHT", "DOUBLE"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "precision"), [*((k, "WATERTIGHT") for k in KINDS), ("BVH2", "DOUBLE"), ("CWBVH", "DOUBLE")]
+)
 def test_spheres_transparency_and_bad_rays_are_as_on_the_cpu(place: str, kind: Any, precision: Any) -> None:
     points, triangles = soup(40)
     rng = np.random.default_rng(4)
@@ -184,3 +187,15 @@ def test_key_of_a_kernel_covers_headers_and_flags(tmp_path: Path, monkeypatch: p
 def test_rays_of_a_wrong_shape_raise_one_clear_error(place: str) -> None:
     with pytest.raises(ValueError, match=r"rays has shape \(4, 6\)"):
         Accel(*soup(3), kind="BRUTE_FORCE", device="CUDA").closest(rows(np.zeros((4, 3)), np.ones((4, 3)))[:, :6])
+
+
+@pytest.mark.parametrize(
+    ("precision", "line", "wrong"),
+    [
+        ("FAST", "mul.f64 %fd1", True), ("FAST", "fma.rn.ftz.f32 %f1", False), ("WATERTIGHT", "mul.rn.f64 %fd1", False),
+        ("WATERTIGHT", "fma.rn.f32 %f1", True), ("WATERTIGHT", "fma.rn.f64 %fd1", True),
+        ("DOUBLE", "add.ftz.f32 %f1", True), ("DOUBLE", "add.rn.f32 %f1", False),
+    ],
+)  # fmt: skip
+def test_gate_sees_instructions_that_a_precision_must_not_have(precision: str, line: str, wrong: bool) -> None:
+    assert bool(faults(("BVH2", precision), f"\t{line}, %x;\n")) == wrong

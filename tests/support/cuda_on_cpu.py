@@ -51,8 +51,8 @@ class _Event:
         pass
 
 
-def compile_module(source: str, folder: Path, include: list[Path]) -> str:
-    """The kernels of one unit as a library: run_NAME(parameters, grid, block) beside each."""
+def compile_module(source: Path, precision: str, folder: Path, include: list[Path]) -> str:
+    """The kernels of one .cu file as a library, its path: run_NAME(parameters, grid, block) for each."""
     names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", _reached(source, include[1]))))
     assert names
     runs = "".join(
@@ -61,20 +61,19 @@ def compile_module(source: str, folder: Path, include: list[Path]) -> str:
         "*(luch::RayBatch*)p[2]); });\n}\n"
         for name in names
     )
-    file = folder / f"unit_{abs(hash(source))}.cpp"
-    file.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n{source}{runs}')
+    file = folder / f"{source.stem}_{precision}.cpp"
+    file.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n#include "{source}"\n{runs}')
     library = file.with_suffix(".so")
-    folders = [f"-I{path}" for path in include]
-    subprocess.run(["c++", *FLAGS, *folders, str(file), "-o", str(library)], check=True)
+    options = [f"-DLUCH_PRECISION={precision}", *(f"-I{path}" for path in include)]
+    subprocess.run(["c++", *FLAGS, *options, str(file), "-o", str(library)], check=True)
     return str(library)
 
 
-def _reached(source: str, kernels: Path) -> str:
+def _reached(source: Path, kernels: Path) -> str:
     """The source with the kernel files that it includes."""
-    text = source
-    for name in re.findall(r'#include "(rays/\w+\.cuh)"', source):
-        text += _reached((kernels / name).read_text(encoding="utf-8"), kernels)
-    return text
+    text = source.read_text(encoding="utf-8")
+    included = re.findall(r'#include "(rays/\w+\.cuh)"', text)
+    return text + "".join(_reached(kernels / name, kernels) for name in included)
 
 
 def fake_cupy() -> Any:

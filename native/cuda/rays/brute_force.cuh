@@ -82,7 +82,9 @@ __device__ __forceinline__ void trace_reduced(const BruteForce& list, const Prim
 
 }  // namespace luch
 
-LUCH_KERNEL(closest_tiled)(LUCH_ARGUMENTS) { luch::trace_tiles<LUCH_PRECISION, luch::NoCounters>(view, all, batch); }
+LUCH_KERNEL(closest_tiled)(LUCH_ARGUMENTS) {
+    luch::trace_tiles<luch::Precision::LUCH_PRECISION, luch::NoCounters>(view, all, batch);
+}
 LUCH_KERNEL(closest_reduced)(LUCH_ARGUMENTS) {
-    luch::trace_reduced<LUCH_PRECISION, luch::NoCounters>(view, all, batch);
+    luch::trace_reduced<luch::Precision::LUCH_PRECISION, luch::NoCounters>(view, all, batch);
 }

@@ -207,17 +207,21 @@ __device__ __forceinline__ void trace_persistent(const Cwbvh& tree, const RayBat
 
 #define LUCH_PERSISTENT_KERNEL(name) extern "C" __global__ void __launch_bounds__(luch::RAY_BLOCK, LUCH_BLOCKS) name
 
-LUCH_PERSISTENT_KERNEL(closest)(LUCH_ARGUMENTS) { luch::trace_persistent<LUCH_PRECISION, false>(view, batch); }
-LUCH_PERSISTENT_KERNEL(any)(LUCH_ARGUMENTS) { luch::trace_persistent<LUCH_PRECISION, true>(view, batch); }
+LUCH_PERSISTENT_KERNEL(closest)(LUCH_ARGUMENTS) {
+    luch::trace_persistent<luch::Precision::LUCH_PRECISION, false>(view, batch);
+}
+LUCH_PERSISTENT_KERNEL(any)(LUCH_ARGUMENTS) {
+    luch::trace_persistent<luch::Precision::LUCH_PRECISION, true>(view, batch);
+}
 LUCH_KERNEL(closest_simple)(LUCH_ARGUMENTS) {
-    luch::trace_closest<LUCH_VIEW, LUCH_PRECISION, luch::NoCounters>(view, all, batch);
+    luch::trace_closest<LUCH_VIEW, luch::Precision::LUCH_PRECISION, luch::NoCounters>(view, all, batch);
 }
 LUCH_KERNEL(any_simple)(LUCH_ARGUMENTS) {
-    luch::trace_any<LUCH_VIEW, LUCH_PRECISION, luch::NoCounters>(view, all, batch);
+    luch::trace_any<LUCH_VIEW, luch::Precision::LUCH_PRECISION, luch::NoCounters>(view, all, batch);
 }
 LUCH_KERNEL(closest_counted)(LUCH_ARGUMENTS) {
-    luch::trace_closest<LUCH_VIEW, LUCH_PRECISION, luch::Counters>(view, all, batch);
+    luch::trace_closest<LUCH_VIEW, luch::Precision::LUCH_PRECISION, luch::Counters>(view, all, batch);
 }
 LUCH_KERNEL(any_counted)(LUCH_ARGUMENTS) {
-    luch::trace_any<LUCH_VIEW, LUCH_PRECISION, luch::Counters>(view, all, batch);
+    luch::trace_any<LUCH_VIEW, luch::Precision::LUCH_PRECISION, luch::Counters>(view, all, batch);
 }

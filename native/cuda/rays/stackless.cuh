@@ -42,4 +42,6 @@ __device__ __forceinline__ void trace_together(const Bvh2Stackless& tree, const 
 
 }  // namespace luch
 
-LUCH_KERNEL(closest_together)(LUCH_ARGUMENTS) { luch::trace_together<LUCH_PRECISION>(view, all, batch); }
+LUCH_KERNEL(closest_together)(LUCH_ARGUMENTS) {
+    luch::trace_together<luch::Precision::LUCH_PRECISION>(view, all, batch);
+}

@@ -1,7 +1,7 @@
 """Kernels from source: NVRTC behind a disk cache of our own.
 
 CuPy's cache does not see the headers that a kernel includes, and its compiler always flushes denormals; so the
-kernels are compiled here. The key of a compiled kernel covers every header and kernel file, the unit, the flags, the
+kernels are compiled here. The key of a compiled kernel covers every header and kernel file, the flags, the
 compiler's version and the architecture: an edited header can never run stale. What `build.py build --cuda` compiled
 ahead of time lies in luch/kernels and is taken first; its key leaves out the compiler's version.
 """
@@ -44,18 +44,9 @@ def _sources_hash() -> str:
     digest = hashlib.sha256()
     for folder in source_folders():
         for path in sorted(folder.rglob("*")):
-            if path.suffix in (".h", ".inc", ".cuh"):
+            if path.suffix in (".h", ".inc", ".cuh", ".cu"):
                 digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
-
-
-def unit(module: str, precision: str) -> str:
-    """The few lines that make one translation unit of a module of kernels.json."""
-    entry = table()["modules"][module]
-    return (
-        f'#include "{entry["header"]}"\n#define LUCH_VIEW luch::{entry["view"]}\n'
-        f'#define LUCH_PRECISION luch::Precision::{precision}\n#include "{entry["code"]}"\n'
-    )
 
 
 def flags(precision: str) -> list[str]:
@@ -65,7 +56,7 @@ def flags(precision: str) -> list[str]:
 
 def ahead_name(module: str, precision: str, architecture: int) -> str:
     """File name under which a kernel compiled ahead of time is looked for."""
-    parts = [_sources_hash(), unit(module, precision), *flags(precision), str(architecture)]
+    parts = [_sources_hash(), table()["modules"][module], *flags(precision), str(architecture)]
     return (
         f"{module}-{precision}-sm_{architecture}-{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:16]}.cubin"
     )
@@ -101,7 +92,8 @@ def _compile(nvrtc: Any, module: str, precision: str, architecture: int) -> byte
     known = [a for a in nvrtc.getSupportedArchs() if a <= architecture]
     target = f"sm_{architecture}" if architecture in known else f"compute_{max(known)}"  # the driver compiles PTX on
     options = [f"-arch={target}", f"-I{include}", f"-I{kernels}", *flags(precision)]
-    program = nvrtc.createProgram(unit(module, precision), f"{module}_{precision}.cu", (), ())
+    source = kernels / table()["modules"][module]
+    program = nvrtc.createProgram(source.read_text(encoding="utf-8"), str(source), (), ())
     try:
         nvrtc.compileProgram(program, tuple(options))
         image: bytes = nvrtc.getCUBIN(program) if target.startswith("sm_") else nvrtc.getPTX(program)

@@ -13,6 +13,9 @@ struct Sphere {
     float radius;
 };
 
+LUCH_FN float root_of(float x) { return __builtin_sqrtf(x); }
+LUCH_FN double root_of(double x) { return __builtin_sqrt(x); }
+
 // Both distances along the ray, near then far, in F; false if the line misses or the sphere has no size.
 template <class F>
 LUCH_FN bool sphere_distances(Vec3 origin, Vec3 direction, const Sphere& sphere, F* near_t, F* far_t) {
@@ -26,7 +29,7 @@ LUCH_FN bool sphere_distances(Vec3 origin, Vec3 direction, const Sphere& sphere,
     F discriminant = r * r - (px * px + py * py + pz * pz);
     if (!(r > F(0)) || !(discriminant >= F(0))) return false;  // NaN: miss
     F c = fx * fx + fy * fy + fz * fz - r * r;
-    F root = F(__builtin_sqrt(double(a * discriminant)));
+    F root = root_of(a * discriminant);
     F q = b + (b < F(0) ? -root : root);
     F t0 = q / a, t1 = q == F(0) ? t0 : c / q;
     *near_t = t0 < t1 ? t0 : t1;

@@ -1,0 +1,127 @@
+"""The CUDA kernels through nvcc, without a GPU: to PTX, and on to machine code for every architecture of kernels.json."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Tuple
+
+from buildtools.failure import BuildFailure
+from buildtools.places import BUILD, NATIVE, VENV_PYTHON
+from buildtools.run import output
+
+FOLDER = BUILD / "kernels"
+AHEAD = NATIVE / "luch" / "kernels"
+DEFAULT = "WATERTIGHT"
+OLDEST = 75  # PTX for it runs on everything newer
+FUSES_BOXES = "CWBVH"  # the one that rounds box distances once, on purpose (accel/wide_ray.h)
+Unit = Tuple[str, str]  # module, precision
+
+
+def table() -> Dict[str, Any]:
+    """native/cuda/kernels.json."""
+    result: Dict[str, Any] = json.loads((NATIVE / "cuda" / "kernels.json").read_text(encoding="utf-8"))
+    return result
+
+
+def units() -> List[Unit]:
+    """Every module in every precision."""
+    precisions = [name for name in table()["flags"] if name != "all"]
+    return [(module, precision) for module in table()["modules"] for precision in precisions]
+
+
+def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
+    """PTX of every unit, and FOLDER/MODULE-PRECISION-sm_XX.cubin. None where no nvcc is. Raises BuildFailure.
+
+    everywhere: all units for all architectures; else those of the default precision, the others for the oldest and
+    the newest.
+    """
+    nvcc = shutil.which("nvcc")
+    if nvcc is None:
+        return None
+    found = nvcc
+    FOLDER.mkdir(parents=True, exist_ok=True)
+
+    def compile_unit(unit: Unit) -> str:
+        module, precision = unit
+        ptx = ptx_of(unit)
+        flags = table()["flags"]["all"] + table()["flags"][precision]
+        folders = ["-I", str(NATIVE / "include"), "-I", str(NATIVE / "cuda")]
+        source = NATIVE / "cuda" / str(table()["modules"][module])
+        errors = _errors([found, "-ptx", f"-arch=compute_{OLDEST}", *flags, *folders, str(source), "-o", str(ptx)])
+        known = table()["architectures"]
+        chosen = known if everywhere or precision == DEFAULT else [known[0], known[-1]]
+        for architecture in [] if errors else chosen:
+            cubin = ptx.with_name(f"{ptx.stem}-sm_{architecture}.cubin")
+            errors += _errors([_ptxas(found), f"-arch=sm_{architecture}", str(ptx), "-o", str(cubin)])
+        return errors
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        failures = [text for text in pool.map(compile_unit, units()) if text]
+    if failures:
+        print("\n".join(failures)[:8000])
+        raise BuildFailure(f"{len(failures)} kernels do not compile")
+    return {unit: ptx_of(unit) for unit in units()}
+
+
+def ptx_of(unit: Unit) -> Path:
+    """Where a unit's PTX lies."""
+    return FOLDER / f"{unit[0]}-{unit[1]}.ptx"
+
+
+def _ptxas(nvcc: str) -> str:
+    beside = Path(nvcc).resolve().with_name("ptxas")
+    return str(beside) if beside.exists() else "ptxas"
+
+
+def _errors(command: List[str]) -> str:
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    return "" if result.returncode == 0 else f"{' '.join(command)}:\n{result.stdout}{result.stderr}"
+
+
+def faults(unit: Unit, ptx: str) -> List[str]:
+    """What a unit's instructions must not hold: slow doubles where speed is asked, sums fused behind our back."""
+    module, precision = unit
+    wrong = []
+    if precision == "FAST" and re.search(r"\.f64\b", ptx):
+        wrong.append("instructions in double precision (.f64), which FAST must not have")
+    if precision != "FAST" and re.search(r"\bfma\.rn\.f64\b", ptx):
+        wrong.append("fma.rn.f64: an edge function is contracted")
+    if precision != "FAST" and module != FUSES_BOXES and re.search(r"\bfma\.rn\.f32\b", ptx):
+        wrong.append("fma.rn.f32: results would differ from the CPU's")
+    if precision != "FAST" and re.search(r"\.ftz\b", ptx):
+        wrong.append(".ftz: denormal numbers would be lost")
+    return [f"{module}, {precision}: {text}" for text in wrong]
+
+
+def check_kernels() -> None:
+    """For the gate: all compile for all architectures, and their PTX is what precision promises."""
+    compiled = compile_kernels(everywhere=False)
+    if compiled is None:
+        print("   left out: no nvcc on PATH")
+        return
+    wrong = [text for unit, path in compiled.items() for text in faults(unit, path.read_text(encoding="utf-8"))]
+    if wrong:
+        print("\n".join(wrong))
+        raise BuildFailure(f"{len(wrong)} faults in the PTX of kernels")
+    print(f"   {len(compiled)} units for {', '.join(f'sm_{a}' for a in table()['architectures'])}")
+
+
+def place_kernels() -> None:
+    """For `build --cuda`: the machine code under the names that luch.cuda looks for, in native/luch/kernels."""
+    if compile_kernels(everywhere=True) is None:
+        raise BuildFailure("build --cuda needs nvcc on PATH; without it kernels are compiled on first use by NVRTC")
+    code = ("import json; from luch.cuda.compiler import ahead_name, table; print(json.dumps([[m, p, a, ahead_name(m, p, a)]"
+            " for m in table()['modules'] for p in table()['flags'] if p != 'all' for a in table()['architectures']]))")  # fmt: skip
+    names = output([str(VENV_PYTHON), "-c", code])
+    if names is None:
+        raise BuildFailure("luch.cuda could not be imported from native/")
+    shutil.rmtree(AHEAD, ignore_errors=True)
+    AHEAD.mkdir()
+    for module, precision, architecture, name in json.loads(names):
+        shutil.copyfile(FOLDER / f"{module}-{precision}-sm_{architecture}.cubin", AHEAD / name)
