@@ -32,8 +32,7 @@ inline constexpr u32 LEAF_SHARE = LUCH_LEAF_SHARE;  // leaves wait until this pa
 
 // A ray's groups that wait. Postponed leaves stand on it too: two entries a level at most.
 struct SplitStack {
-    u64* shared;  // this thread's column
-    u64 local[2 * CWBVH_MAX_DEPTH - SHARED_ENTRIES];
+    u64 *shared, *local;  // this thread's column; an array of its own
     u32 size;
     __device__ __forceinline__ void push(WaitingGroup group) {
         u64 entry = u64(group.hits) << 32 | group.first;
@@ -82,30 +81,36 @@ __device__ __forceinline__ T load_quads(const T* from) {  // 16 bytes at a time,
     return out;
 }
 
+// What a lane needs at leaves and at the end alone: in shared memory, so that registers are left for boxes.
+template <Precision P>
+struct Aside {
+    PrimitiveRay<P> tested;
+    RefHit best;
+    float t_min;
+    u32 index;
+};
+
 // One lane's ray on its way.
 template <Precision P, bool ANY>
 struct Walker {
-    PrimitiveRay<P> tested;
+    Aside<P>* aside;
     WideRay wide;
-    RefHit best;
-    float t_min, first, last;
-    u32 index;
+    float first, last;
     WaitingGroup group;
     u8 blocked;
-    bool busy = false;
+    bool busy;
 
-    __device__ __forceinline__ Walker() : tested(Ray{{0.0f, 0.0f, 0.0f}, 0.0f, {0.0f, 0.0f, 1.0f}, 0.0f}) {}
     // Takes the ray with that index, or answers it at once.
     __device__ __forceinline__ void begin(const Cwbvh& tree, const RayBatch& batch, u32 i, SplitStack* stack) {
         Ray ray;
         busy = load_ray(batch, i, &ray) && tree.node_count != 0;
-        index = i;
-        best = no_hit(ray);
+        aside->index = i;
+        aside->best = no_hit(ray);
         blocked = BLOCKED_NOT;
         if (!busy) return finish(batch);
-        tested = PrimitiveRay<P>(ray);
+        aside->tested = PrimitiveRay<P>(ray);
+        aside->t_min = ray.t_min;
         wide = make_wide_ray(ray, tree.root);
-        t_min = ray.t_min;
         first = wide.lower(ray.t_min);
         last = wide.upper(ray.t_max);
         group = {0, 0x80000000u};
@@ -114,9 +119,9 @@ struct Walker {
     __device__ __forceinline__ void finish(const RayBatch& batch) {
         busy = false;
         if constexpr (ANY)
-            batch.blocked[index] = blocked;
+            batch.blocked[aside->index] = blocked;
         else
-            store_hit(batch, index, best);
+            store_hit(batch, aside->index, aside->best);
     }
     // Visits the next child of the group, or takes its primitives; returns those that the ray may hit.
     __device__ __forceinline__ WaitingGroup visit(const Cwbvh& tree, SplitStack* stack) {
@@ -141,14 +146,15 @@ struct Walker {
         const LeafPrimitive p = load_quads(tree.leaves + leaves->first + bit);
         NoCounters none;
         TriangleHit hit;
-        if (!test_leaf(p, tested, t_min, best.t, &hit, none)) return false;
+        RefHit best = aside->best;
+        if (!test_leaf(p, aside->tested, aside->t_min, best.t, &hit, none)) return false;
         if constexpr (ANY) {
             bool maybe = p.flags & PRIMITIVE_MAY_BE_TRANSPARENT;
             blocked = maybe ? u8(BLOCKED_MAYBE) : u8(BLOCKED_OPAQUE);
             return !maybe;
         }
         if (!is_closer(hit.t, p.ref, best)) return false;
-        best = {hit.t, p.ref, hit.u, hit.v};
+        aside->best = {hit.t, p.ref, hit.u, hit.v};
         last = wide.upper(hit.t);
         return false;
     }
@@ -176,10 +182,13 @@ __device__ __forceinline__ void test_leaves(const Cwbvh& tree, const RayBatch& b
 template <Precision P, bool ANY>
 __device__ __forceinline__ void trace_persistent(const Cwbvh& tree, const RayBatch& batch) {
     __shared__ u64 columns[SHARED_ENTRIES * RAY_BLOCK];
-    SplitStack stack;
-    stack.shared = columns + threadIdx.x;
-    stack.size = 0;
+    __shared__ u64 asides[RAY_BLOCK * sizeof(Aside<P>) / sizeof(u64)];
+    static_assert(sizeof(Aside<P>) % sizeof(u64) == 0);
+    u64 local[2 * CWBVH_MAX_DEPTH - SHARED_ENTRIES];
+    SplitStack stack = {columns + threadIdx.x, local, 0};
     Walker<P, ANY> walker;
+    walker.aside = reinterpret_cast<Aside<P>*>(asides) + threadIdx.x;
+    walker.busy = false;
     RayPool pool;
     for (;;) {
         u32 index = pool.give(batch, !walker.busy);

@@ -76,11 +76,12 @@ LUCH_FN u32 intersect_children(const CwbvhNode& node, const WideRay& ray, float 
         for (u32 i = 0; i < 4; ++i) {
             float enter = first, leave = last;
             for (int axis = 0; axis < 3; ++axis) {  // NaN: the axis does not count
-                enter =
-                    larger(fused(byte_above_32768(near_plane[axis], i), planes.near_step[axis], planes.near_base[axis]),
-                           enter);
-                leave = smaller(
-                    fused(byte_above_32768(far_plane[axis], i), planes.far_step[axis], planes.far_base[axis]), leave);
+                enter = larger(fused(byte_above_32768(near_plane[axis], i, ray.byte_bias), planes.near_step[axis],
+                                     planes.near_base[axis]),
+                               enter);
+                leave = smaller(fused(byte_above_32768(far_plane[axis], i, ray.byte_bias), planes.far_step[axis],
+                                      planes.far_base[axis]),
+                                leave);
             }
             if (enter <= leave) hits |= (count >> (8 * i) & 0xffu) << (bit >> (8 * i) & 0xffu);
         }

@@ -28,12 +28,22 @@ inline constexpr float WIDEST = 1e27f;  // extent of a node's box
 inline constexpr u32 SMALLEST_STEP = 20;  // biased exponents: 2^-107, so that A is no denormal,
 inline constexpr u32 LARGEST_STEP = 217;  // 2^90
 
+// byte_above_32768 with its constant in a register whose value CUDA's compiler does not know: of two constants it would
+// copy one anew for every byte.
+inline constexpr u32 BYTE_BIAS = 0x47000000u;
+#if LUCH_CUDA
+LUCH_FN float byte_above_32768(u32 x, u32 i, u32 bias) { return bits_float(__byte_perm(x, bias, 0x7404u | i << 4)); }
+#else
+LUCH_FN float byte_above_32768(u32 x, u32 i, u32) { return byte_above_32768(x, i); }
+#endif
+
 struct WideRay {
     float origin[3];
     float near_rdir[3], far_rdir[3];  // signed
     float shift[3];  // by which near and far move apart: parallel axes only
     float scale;  // D of t = 1
     u32 octant;  // bit 2: x is negative, 1: y, 0: z
+    u32 byte_bias;  // BYTE_BIAS
     // Never below the distance of a hit at t.
     LUCH_FN float upper(float t) const { return fused(t, scale * (1.0f + 4.0f * EPS), 1e-37f); }
     LUCH_FN float lower(float t) const { return fused(t, scale * (1.0f - 4.0f * EPS), -1e-37f); }
@@ -46,6 +56,7 @@ LUCH_FN WideRay make_wide_ray(const Ray& ray, const Box& root) {
     float reach = max_component(extent);
     out.scale = max_component(abs_v(ray.direction));
     out.octant = 0;
+    out.byte_bias = BYTE_BIAS | float_bits(ray.t_max) >> 31;  // t_max > 0: no bit, but the compiler cannot tell
     for (int axis = 0; axis < 3; ++axis) {
         float slope = abs_f(ray.direction[axis]) / out.scale;
         float sign = copysign_f(1.0f, ray.direction[axis]);
