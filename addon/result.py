@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from luch import cryptomatte
+from luch import cryptomatte, effects
 from luch.scene import F32, Film, Scene
 
 
@@ -53,6 +53,8 @@ class ResultWriter:
         if final is None:
             return
         for key, value in stats.items():
+            if key == "effects":  # their reasons would outweigh all the rest
+                value = effects.summary(value)
             text = value if isinstance(value, str) else json.dumps(value)
             final.stamp_data_add_field(f"luch.{self._layer}.{key}", text)
         for key, text in cryptomatte.metadata(scene, self._layer).items():

@@ -20,11 +20,13 @@ class ExportContext:
         self._images: dict[tuple[Any, ...], int] = {}
         self._warned: set[str] = set()
 
-    def warn(self, text: str) -> None:
-        """Say one sentence to the user, once: object, fact, remedy."""
+    def warn(self, text: str, effect: str = "") -> None:
+        """Say one sentence to the user, once: object, fact, remedy. effect: of luch.effects, that is missing here."""
         if text not in self._warned:
             self._warned.add(text)
             self.result.warnings.append(text)
+            if effect:
+                self.result.unsupported.setdefault(effect, []).append(text)
 
     def image_index(self, image: Any, user: Any = None, *, tile: int = 0) -> int:
         """Index into `Scene.images` of an image's pixels at this frame; a magenta marker if there are none.

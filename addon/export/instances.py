@@ -17,7 +17,11 @@ from .visibility import instance_visibility
 # Their meshes arrive as instances of their own (Blender 5): exporting these too would double them.
 LISTED_AGAIN_AS_MESH = frozenset({"CURVE", "SURFACE", "FONT", "META"})
 NOTHING_TO_DRAW = frozenset({"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "GREASEPENCIL"})
-NOT_SUPPORTED = {"CURVES": "hair curves", "POINTCLOUD": "a point cloud", "VOLUME": "a volume"}
+NOT_SUPPORTED = {  # type -> what it is, the effect that is missing
+    "CURVES": ("hair curves", "hair"),
+    "POINTCLOUD": ("a point cloud", "point clouds"),
+    "VOLUME": ("a volume", "volumes"),
+}
 NO_OBJECT = -1
 NO_INSTANCER_GENERATED = (1.0, 1.0, 1.0)  # an orco of 1 gives generated 0
 NO_INSTANCER_UV = (0.0, 0.0)
@@ -58,8 +62,9 @@ class InstanceCollector:
         elif kind == "LIGHT":
             self._add_light(item, subject)
         elif kind in NOT_SUPPORTED:
+            what, effect = NOT_SUPPORTED[kind]
             self._context.warn(
-                f'Object "{subject.name}" is {NOT_SUPPORTED[kind]}, which Luch does not draw yet: it is left out.'
+                f'Object "{subject.name}" is {what}, which Luch does not draw yet: it is left out.', effect
             )
 
     def _warn_about_what_is_missing(self, subject: Any) -> None:
@@ -68,13 +73,15 @@ class InstanceCollector:
             self._context.warn(f'Object "{subject.name}" is a shadow catcher; Luch draws it as an ordinary object.')
         linking = subject.light_linking
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
-            self._context.warn(f'Object "{subject.name}" uses light linking; Luch lights everything by every light.')
+            self._context.warn(
+                f'Object "{subject.name}" uses light linking; Luch lights everything by every light.', "light linking"
+            )
         # Particle hair hides in its object's modifiers.
         if any(
             system.settings.type == "HAIR" and system.settings.render_type == "PATH"
             for system in subject.particle_systems
         ):
-            self._context.warn(f'Object "{subject.name}" has particle hair, which Luch does not draw yet.')
+            self._context.warn(f'Object "{subject.name}" has particle hair, which Luch does not draw yet.', "hair")
 
     def finish(self) -> None:
         """Turn the columns into arrays."""

@@ -45,9 +45,14 @@ def _warn_about_what_is_missing(context: ExportContext) -> None:
     """Say which settings of the scene change nothing yet."""
     render = context.scene.render
     if render.use_motion_blur and context.view_layer.use_motion_blur:
-        context.warn(f'Scene "{context.scene.name}" has motion blur, which Luch does not draw yet: the frame is sharp.')
+        context.warn(
+            f'Scene "{context.scene.name}" has motion blur, which Luch does not draw yet: the frame is sharp.',
+            "motion blur",
+        )
     if render.use_multiview:
-        context.warn(f'Scene "{context.scene.name}" is stereoscopic; Luch draws every view from the same camera.')
+        context.warn(
+            f'Scene "{context.scene.name}" is stereoscopic; Luch draws every view from the same camera.', "stereoscopy"
+        )
 
 
 def _camera(context: ExportContext, engine: Any) -> Any:

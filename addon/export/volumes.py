@@ -13,7 +13,9 @@ from .context import ExportContext
 def warn_about_volume(kind: str, owner: Any, context: ExportContext) -> None:
     """Say that a material's or world's volume is missing. kind: "Material" or "World"."""
     if _is_linked(owner, "Volume"):
-        context.warn(f'{kind} "{owner.name}" has a volume, which Luch does not draw yet: light passes it unchanged.')
+        context.warn(
+            f'{kind} "{owner.name}" has a volume, which Luch does not draw yet: light passes it unchanged.', "volumes"
+        )
 
 
 def is_only_volume(material: Any) -> bool:

@@ -17,6 +17,7 @@ import numpy as np
 from luch import __version__, cryptomatte
 from luch.bench import device_rays
 from luch.cuda import DeviceError
+from luch.effects import effects_of, summary
 from luch.scene import Scene
 from luch.scenefile import read_scene
 
@@ -121,6 +122,8 @@ def _statistics(result: Result) -> dict[str, str | int | float]:
     """Statistics as header fields: plain values as they are, others as JSON."""
     fields: dict[str, str | int | float] = {}
     for key, value in result.stats.items():
+        if key == "effects":
+            value = summary(value)
         plain = isinstance(value, str | int | float) and not isinstance(value, bool)
         # A header's integers have 32 bits.
         if plain and not (isinstance(value, int) and abs(value) >= 2**31):
@@ -186,6 +189,7 @@ def _bench_rays(options: argparse.Namespace) -> int:
 def _info(options: argparse.Namespace) -> int:
     scene = read_scene(options.scene)
     print("\n".join(describe(scene)))
+    print(f"\n{effects_of(scene)}")
     return 0
 
 

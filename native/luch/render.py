@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from luch._native import core
+from luch.effects import effects_of
 from luch.scene import F32, Scene
 
 # A step is watched this often: what a cancel waits for at most, beside one batch of paths.
@@ -115,6 +116,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     """
     start = time.perf_counter()
     renderer = core.render.Renderer(scene)
+    effects = effects_of(scene).as_dict()
     settings = scene.settings
     total = max(1, settings.samples)
     cancelled = not _watched(renderer.prepare, renderer, lambda: progress is None or progress(_preparing(total, start)))
@@ -174,6 +176,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         cancelled=cancelled,
         stopped_by="cancel" if cancelled else "time" if timed_out else "samples",
         warnings=list(scene.warnings),
+        effects=effects,
     )
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
     return Result(passes, stats, cancelled)

@@ -238,3 +238,5 @@ class Scene:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # subtracted from every position in double
     frame: int = 1
     warnings: list[str] = field(default_factory=list)  # one sentence each: object, fact, remedy
+    # What the exporter met and Luch does not draw yet: name of an effect (luch.effects) -> its warnings.
+    unsupported: dict[str, list[str]] = field(default_factory=dict)

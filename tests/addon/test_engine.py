@@ -134,6 +134,9 @@ def test_statistics_are_kept_and_written_into_the_file(room: bpy.types.Scene) ->
     header = metadata(Path(room.render.filepath))
     assert header["luch.ViewLayer.samples"] == "1"
     assert header["luch.ViewLayer.seed"] == "7"
+    assert stats["effects"]["sun lamps"]["reason"] == '"Sun"'
+    assert header["luch.ViewLayer.effects"].startswith("sun lamps, ")
+    assert len(header["luch.ViewLayer.effects"]) < 500, "names alone: reasons are for the statistics"
 
 
 def test_cryptomatte_carries_its_manifest(room: bpy.types.Scene) -> None:

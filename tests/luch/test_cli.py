@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -139,6 +140,7 @@ def test_info_says_what_is_in_a_scene(file: Path, capsys: pytest.CaptureFixture[
     text = capsys.readouterr().out
     for part in ("Hof", "1 with 1 triangles", "Stein", "2 area, 1 sun", "depth of field", "8 x 4", "has no normals"):
         assert part in text
+    assert re.search(r"\n  on +sun lamps +", text) and re.search(r"\n  off +coat +every coat weight is 0", text)
     assert all(line.strip() for line in describe(Scene()))
 
 
@@ -150,4 +152,5 @@ def test_python_m_luch_renders_a_file_from_nothing_else(file: Path) -> None:
     assert done.returncode == 0, done.stderr
     passes, metadata = image.read_exr(output)
     assert passes["ViewLayer.Combined"].shape == (4, 8, 4) and metadata["luch.samples"] == 2
+    assert "sun lamps" in metadata["luch.effects"] and len(metadata["luch.effects"]) < 500  # names, no reasons
     assert "ViewLayer.CryptoObject02" in passes

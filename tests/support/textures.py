@@ -138,7 +138,7 @@ class Context:
         self.view_layer = self.scene.view_layers[0]
         self.frame = self.scene.frame_current
 
-    def warn(self, text: str) -> None:
+    def warn(self, text: str, effect: str = "") -> None:
         self.warnings.append(text)
 
     def image_index(self, image: bpy.types.Image | None, user: Any = None, *, tile: int = 0) -> int:

@@ -128,7 +128,9 @@ def _emit_displacement(compiler: Compiler, material: bpy.types.Material) -> None
     if output is None or not compiler.is_linked(output, "Displacement"):
         return
     if material.displacement_method != "BUMP":
-        compiler.warn(output, "displaces the surface, which is not supported yet; bump is shown instead")
+        compiler.warn(
+            output, "displaces the surface, which is not supported yet; bump is shown instead", "displacement"
+        )
     b = compiler.builder
     plain = normal(compiler)
     compiler.surface_normal = bump_normal(

@@ -146,7 +146,7 @@ def principled(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     thin_wall, transmission = c.float(node, "Thin Wall"), c.float(node, "Transmission Weight")
     lets_through = b.known(thin_wall) != 0.0 and b.known(transmission) != 0.0
     if b.known(thin_wall) in (None, 0.0) and b.known(c.float(node, "Subsurface Weight")) != 0.0:
-        c.warn(node, "scatters under the surface, which is not supported yet; it is shown as diffuse")
+        c.warn(node, "scatters under the surface, which is not supported yet; it is shown as diffuse", "subsurface")
     params = _params(c, int(node.distribution == "MULTI_GGX"), int(emits), int(lets_through))
     b.closure("CLOSURE_PRINCIPLED", weight, _principled_inputs(c, node, thin_wall, glow), params)
 
@@ -185,7 +185,7 @@ def _principled_inputs(c: Compiler, node: bpy.types.Node, thin_wall: Value, glow
 @closure_emitter("ShaderNodeSubsurfaceScattering")
 def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Subsurface Scattering: diffuse of the same colour."""
-    c.warn(node, "is not supported yet; it is shown as diffuse of its colour")
+    c.warn(node, "is not supported yet; it is shown as diffuse of its colour", "subsurface")
     inputs = (*c.color(node, "Color"), c.builder.constant(0.0), *_normal(c, node))
     c.builder.closure("CLOSURE_DIFFUSE", weight, inputs, _params(c))
 
@@ -193,7 +193,7 @@ def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
 @closure_emitter("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled")
 def as_diffuse(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Hair: diffuse of the same colour."""
-    c.warn(node, "is not supported yet; it is shown as diffuse of its colour")
+    c.warn(node, "is not supported yet; it is shown as diffuse of its colour", "hair")
     zero = c.builder.constant(0.0)
     c.builder.closure("CLOSURE_DIFFUSE", weight, (*c.color(node, "Color"), zero, zero, zero, zero), _params(c))
 

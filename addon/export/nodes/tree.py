@@ -50,8 +50,8 @@ class Context(Protocol):
     def image_index(self, image: bpy.types.Image | None, user: Any = None, *, tile: int = 0) -> int:
         """Index into luch.Scene.images of an image's pixels at this frame; a magenta marker without pixels."""
 
-    def warn(self, text: str) -> None:
-        """Adds one sentence to the scene's warnings."""
+    def warn(self, text: str, effect: str = "") -> None:
+        """Adds one sentence to the scene's warnings. effect: of luch.effects, that is missing here."""
 
     scene: bpy.types.Scene
     view_layer: bpy.types.ViewLayer
@@ -182,12 +182,12 @@ class Compiler:
 
     # -- messages -----------------------------------------------------------------------------
 
-    def warn(self, node: bpy.types.Node, fact: str) -> None:
-        """One warning per node and fact, naming both."""
+    def warn(self, node: bpy.types.Node, fact: str, effect: str = "") -> None:
+        """One warning per node and fact, naming both. effect: of luch.effects, that is missing here."""
         label = node.label or node.bl_label
         if (label, fact) not in self._warned:
             self._warned.add((label, fact))
-            self.context.warn(f'{self.owner}: node "{label}" {fact}.')
+            self.context.warn(f'{self.owner}: node "{label}" {fact}.', effect)
 
     # -- inside -------------------------------------------------------------------------------
 

@@ -1,0 +1,186 @@
+"""Effects of the camera, of geometry, of the lengths of paths, and of the film."""
+
+from __future__ import annotations
+
+from luch.effects.shown import Shown
+from luch.effects.surfaces import facts
+from luch.effects.table import Effects
+from luch.scene import Film
+
+_SUM_BYTES = 8  # a number of the film is a double
+# Pass -> numbers of its own that a pixel keeps.
+PASSES = {
+    "Combined": 4, "Depth": 1, "Mist": 1, "Position": 3, "Normal": 3, "UV": 3, "Object Index": 1, "Material Index": 1,
+    "Diffuse Direct": 3, "Diffuse Indirect": 3, "Diffuse Color": 3,
+    "Glossy Direct": 3, "Glossy Indirect": 3, "Glossy Color": 3,
+    "Transmission Direct": 3, "Transmission Indirect": 3, "Transmission Color": 3,
+    "Emission": 3, "Environment": 3, "Ambient Occlusion": 3, "Denoising Albedo": 3, "Denoising Normal": 3,
+    "Sample Count": 0,
+}  # fmt: skip
+_COUNTS_BYTES = 4  # samples of a pixel
+
+# What the exporter meets and Luch cannot draw: effect, group, why it is off where nothing was met.
+_LATER = (
+    ("motion blur", "Camera", "the scene asks for no motion blur"),
+    ("stereoscopy", "Camera", "the scene is not stereoscopic"),
+    ("hair", "Geometry", "the scene has none"),
+    ("point clouds", "Geometry", "the scene has none"),
+    ("volumes", "Geometry", "no object, material or world has a volume"),
+    ("displacement", "Geometry", "no material displaces its surface"),
+    ("light linking", "Light", "no object uses it"),
+)
+
+
+def add_camera(effects: Effects, shown: Shown) -> None:
+    """Lens and projection."""
+    camera = shown.scene.camera
+    stop = f"the f-stop is set (f/{camera.fstop:g})"
+    if camera.use_dof:
+        reason = f"f/{camera.fstop:g}, in focus at {camera.focus_distance:.4g} m"
+        effects.add("Camera", "depth of field", True, reason, cost="two more random numbers per path")
+    else:
+        reason = f"{stop} but the camera's Depth of Field is disabled"
+        effects.add("Camera", "depth of field", False, reason)
+    polygon = camera.blades >= 3
+    none = "the aperture is round" if camera.use_dof else "there is no depth of field"
+    on = camera.use_dof and polygon
+    effects.add("Camera", "aperture blades", on, f"{camera.blades} blades" if on else none)
+    panorama = camera.kind == "EQUIRECTANGULAR"
+    kind = {"PERSP": "perspective", "ORTHO": "orthographic"}.get(camera.kind, camera.kind)
+    reason = "the camera sees all around" if panorama else f"the camera is {kind}"
+    effects.add("Camera", "panorama", panorama, reason)
+
+
+def add_geometry(effects: Effects, shown: Shown) -> None:
+    """Instances."""
+    repeated = {mesh: count for mesh, count in shown.uses.items() if count > 1}
+    if repeated:
+        saved = sum(len(shown.scene.meshes[mesh].triangles) * (count - 1) for mesh, count in repeated.items())
+        meshes = "1 mesh is" if len(repeated) == 1 else f"{len(repeated)} meshes are"
+        reason = f"{meshes} drawn {sum(repeated.values()):,} times"
+        effects.add("Geometry", "instancing", True, reason, cost=f"saves {saved:,} triangles")
+    else:
+        effects.add("Geometry", "instancing", False, "every mesh is drawn once" if shown.uses else "nothing is drawn")
+
+
+def add_paths(effects: Effects, shown: Shown) -> None:
+    """Which bounces can matter, and what cuts light off."""
+    settings = shown.scene.settings
+    most = [
+        _add_bounces(effects, shown, "diffuse", ("diffuse",), settings.diffuse_bounces),
+        _add_bounces(effects, shown, "glossy", ("glossy",), settings.glossy_bounces),
+        _add_bounces(
+            effects,
+            shown,
+            "transmission",
+            ("transmission", "translucency", "thin subsurface"),
+            settings.transmission_bounces,
+        ),
+    ]
+    _add_bounces(effects, shown, "transparent", ("transparency",), settings.transparent_bounces)
+    reach = min(settings.max_bounces, sum(most))
+    if reach:
+        reason = f"{reach} at most: what the kinds that are on allow, up to {settings.max_bounces}"
+    elif settings.max_bounces:
+        reason = "no kind of bounce is on: direct light alone"
+    else:
+        reason = "Max Bounces is 0: direct light alone"
+    effects.add("Paths", "indirect light", reach > 0, reason)
+    _add_limits(effects, shown, effects["diffuse bounces"].on, effects["glossy bounces"].on)
+
+
+def _add_bounces(effects: Effects, shown: Shown, kind: str, traits: tuple[str, ...], limit: int) -> int:
+    """Returns how many bounces of the kind a path can make before it ends."""
+    name = f"{kind} bounces"
+    for trait in traits:
+        found = [surface for surface in shown.surfaces if trait in surface.traits]
+        if found:
+            reason = f"up to {limit}: {facts(found, trait)}" if limit else f"set to 0, though {facts(found, trait)}"
+            effects.add("Paths", name, limit > 0, reason)
+            return limit
+    verb = {"diffuse": "scatters diffusely", "glossy": "reflects", "transmission": "transmits light"}
+    reason = f"no material that is shown {verb.get(kind, 'is transparent')}: the limit of {limit} cannot matter"
+    effects.add("Paths", name, False, reason)
+    return 0
+
+
+def _add_limits(effects: Effects, shown: Shown, diffuse: bool, glossy: bool) -> None:
+    settings = shown.scene.settings
+    through = effects["transmission bounces"].on
+    for name, wanted, source, label in (
+        ("reflective caustics", settings.caustics_reflective, glossy, "Reflective"),
+        ("refractive caustics", settings.caustics_refractive, through, "Refractive"),
+    ):
+        able = diffuse and source
+        on = wanted and able
+        off = f"Caustics > {label} is disabled" if able else "they need diffuse bounces and such a surface"
+        effects.add("Paths", name, on, "diffuse surfaces may be lit by way of such a surface" if on else off)
+    clamps = [
+        f"{label} light above {limit:g} is cut"
+        for label, limit in (("direct", settings.clamp_direct), ("indirect", settings.clamp_indirect))
+        if limit > 0.0
+    ]
+    effects.add(
+        "Paths", "clamping", bool(clamps), ", ".join(clamps) or "both limits are 0", cost="loses light" * bool(clamps)
+    )
+    blur = settings.filter_glossy
+    on = blur > 0.0 and (glossy or through)
+    off = "nothing reflects or transmits" if blur > 0.0 else "Filter Glossy is 0"
+    effects.add("Paths", "filter glossy", on, f"Filter Glossy is {blur:g}" if on else off)
+
+
+def add_film(effects: Effects, shown: Shown) -> None:
+    """What the picture keeps."""
+    film = shown.scene.film
+    reason = "Film > Transparent is enabled" if film.transparent else "Film > Transparent is disabled"
+    effects.add("Film", "transparent film", film.transparent, reason)
+    glass = film.transparent and film.transparent_glass
+    through = effects["transmission"].on
+    off = "nothing transmits light" if glass else "Film > Transparent Glass is disabled"
+    on = glass and through
+    effects.add("Film", "transparent glass", on, "Film > Transparent Glass is enabled" if on else off)
+    told = shown.shadow_catchers
+    reason = f'object "{told[0]}" is one: drawn as an ordinary object' if told else "no object is one"
+    effects.add("Film", "shadow catcher", False, reason, missing=bool(told))
+    _add_passes(effects, film)
+
+
+def _add_passes(effects: Effects, film: Film) -> None:
+    asked = {"Combined", *film.passes}
+    for name, numbers in PASSES.items():
+        cost = _bytes(numbers)
+        if name == "Ambient Occlusion":
+            cost += ", one more shadow ray at each point that the camera sees"
+        on = name in asked
+        effects.add("Film", f"pass {name}", on, "asked for" if on else "not asked for", cost=cost if on else "")
+    layers = [name for name in film.passes if name.startswith("Crypto")]
+    kinds = sorted({name.rstrip("0123456789")[len("Crypto") :] for name in layers})
+    slots = max(film.cryptomatte_depth, 1)
+    reason = f"{', '.join(kinds)}: {slots} names a pixel" if layers else "no Cryptomatte pass is asked for"
+    effects.add("Film", "cryptomatte", bool(layers), reason, cost=_bytes(2 * slots * len(kinds)) if layers else "")
+    aovs = [name for name, _ in film.aovs]
+    cost = _bytes(4 * len(aovs)) if aovs else ""
+    effects.add("Film", "AOVs", bool(aovs), ", ".join(aovs) or "the view layer has none", cost=cost)
+    groups = film.lightgroups
+    cost = _bytes(3 * len(groups)) if groups else ""
+    effects.add("Film", "light groups", bool(groups), ", ".join(groups) or "the view layer has none", cost=cost)
+
+
+def _bytes(numbers: int) -> str:
+    return f"{numbers * _SUM_BYTES or _COUNTS_BYTES} bytes a pixel"
+
+
+def add_later(effects: Effects, shown: Shown) -> None:
+    """What the exporter met and Luch does not draw yet, in the exporter's own words."""
+    told = dict(shown.scene.unsupported)
+    told.pop("subsurface", None)  # told with the surfaces
+    for name, group, off in _LATER:
+        _add_missing(effects, group, name, told.pop(name, []), off)
+    for name, sentences in told.items():
+        if name not in effects:
+            _add_missing(effects, "Geometry", name, sentences, "")
+
+
+def _add_missing(effects: Effects, group: str, name: str, sentences: list[str], off: str) -> None:
+    more = f" And {len(sentences) - 1} more." if len(sentences) > 1 else ""
+    effects.add(group, name, False, sentences[0] + more if sentences else off, missing=bool(sentences))

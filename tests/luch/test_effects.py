@@ -1,0 +1,429 @@
+"""Which effects a scene needs: each on and off, with the reason that a user reads."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from luch.effects import Effect, Effects, effects_of, summary
+from luch.effects.closures import LAYOUTS, input_places
+from luch.effects.picture import PASSES
+from luch.effects.programs import decode, read_program
+from luch.scene import Camera, Film, Image, Instances, Light, Material, Mesh, Object, Program, Scene, Settings, World
+from luch.shader import ProgramBuilder, Value, Vector
+from luch.shader_code import OPS
+
+HEADER = Path(__file__).resolve().parents[2] / "native/include/luch/shade/nodes/closures.h"
+ONE = (1.0, 1.0, 1.0)
+Inputs = dict[str, object]
+# A Principled BSDF as Blender adds it.
+PLAIN: Inputs = {
+    "base_color": (0.8, 0.8, 0.8), "metallic": 0.0, "roughness": 0.5, "ior": 1.5, "thin_wall": 0.0,
+    "specular_ior_level": 0.5, "specular_tint": ONE, "coat_roughness": 0.03, "coat_ior": 1.5, "coat_tint": ONE,
+    "sheen_roughness": 0.5, "sheen_tint": ONE, "emission_strength": 1.0, "thin_film_ior": 1.33,
+}  # fmt: skip
+
+
+def values(builder: ProgramBuilder, given: object, count: int) -> list[Value]:
+    """Constants of numbers; values that are computed stay as they are."""
+    if isinstance(given, int) and not isinstance(given, bool):  # a Value is an int: a number is a float
+        return [Value(given)] * count
+    parts = given if isinstance(given, tuple) else (given,) * count
+    return [part if isinstance(part, int) else builder.constant(float(part)) for part in parts]  # type: ignore[arg-type]
+
+
+def closure(builder: ProgramBuilder, name: str, inputs: Inputs, weight: object = ONE, params: object = ()) -> None:
+    """A closure by the names of its inputs; those that are not named are 0."""
+    read = [
+        value
+        for label, (_, count) in input_places(name).items()
+        if label != "weight"
+        for value in values(builder, inputs.get(label, 0.0), count)
+    ]
+    x, y, z = values(builder, weight, 3)
+    words = tuple(params) if isinstance(params, tuple) and params else (1,) * OPS[name].params
+    builder.closure(name, (x, y, z), read, words)
+
+
+def principled(builder: ProgramBuilder, alpha: float = 1.0, emits: bool = False, **inputs: object) -> None:
+    """As the exporter writes it: alpha is a closure of its own and part of the weight."""
+    through = builder.constant(1.0 - alpha)
+    builder.closure("CLOSURE_TRANSPARENT", (through, through, through))
+    thin = int(inputs.get("thin_wall", 0.0) != 0.0 and inputs.get("transmission_weight", 0.0) != 0.0)
+    closure(builder, "CLOSURE_PRINCIPLED", {**PLAIN, **inputs}, (alpha,) * 3, (1, 1, int(emits), thin))
+
+
+def noise(builder: ProgramBuilder) -> Value:
+    """A value that no one knows beforehand."""
+    position = builder.op3("POINT_POSITION", (), (0, 0))
+    return builder.op1("WHITE_NOISE_3D", position, (0,)) if OPS["WHITE_NOISE_3D"].outputs == 1 else position[0]
+
+
+def program(build: Callable[[ProgramBuilder], None] | None) -> Program:
+    builder = ProgramBuilder()
+    if build is not None:
+        build(builder)
+    return builder.finish()
+
+
+def scene(build: Callable[[ProgramBuilder], None] | None = None, *, copies: int = 1, **fields: object) -> Scene:
+    """One triangle with the material "Leaves", `copies` times; no world, no lamp."""
+    mesh = Mesh("Triangle", np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32), np.zeros(1, np.uint16))
+    instances = Instances(
+        np.zeros(copies, np.uint32),
+        np.repeat(np.eye(3, 4)[None], copies, axis=0),
+        np.zeros(copies, np.float32),
+        np.zeros((copies, 3), np.float32),
+        np.zeros((copies, 2), np.float32),
+    )
+    result = Scene(
+        meshes=[mesh],
+        objects=[Object("Tree", 0, [0])],
+        instances=instances,
+        materials=[Material("Leaves", program(build))],
+    )
+    for name, value in fields.items():
+        setattr(result, name, value)
+    return result
+
+
+def surface(**inputs: object) -> Effects:
+    """Effects of one triangle of Principled."""
+    return effects_of(scene(lambda b: principled(b, **inputs)))  # type: ignore[arg-type]
+
+
+def test_inputs_of_closures_are_those_of_the_header() -> None:
+    text = HEADER.read_text(encoding="utf-8")
+    for name in LAYOUTS:
+        assert sum(count for _, count in input_places(name).values()) == OPS[name].inputs, name
+    body = {found[0]: found[1] for found in re.findall(r"struct OpClosure(Principled)\b(.*?)return p;", text, re.S)}
+    for found in re.finditer(r"LUCH_LOBE_OP\(OpClosure(\w+),(.*?)\n\}\);", text, re.S):
+        body[found[1]] = found[2]
+    for kind in ("Principled", "Glossy", "Metallic", "Glass", "Refraction"):
+        read = re.findall(r"p\.(\w+) = read\.(vec3|number)\(\)", body[kind])
+        ours = [(label, count) for label, (_, count) in input_places(f"CLOSURE_{kind.upper()}").items()][1:]
+        assert ours == [(label, 3 if kind == "vec3" else 1) for label, kind in read], kind
+
+
+def test_a_plain_surface_needs_no_more_than_diffuse_and_glossy_bounces() -> None:
+    effects = surface()
+    assert effects.names(on=True) == [
+        "diffuse bounces", "glossy bounces", "indirect light", "reflective caustics", "pass Combined",
+    ]  # fmt: skip
+    assert effects["transmission"].reason == "no material transmits light: every transmission weight is 0"
+    assert effects["transmission bounces"].reason.endswith("the limit of 12 cannot matter")
+
+
+@pytest.mark.parametrize(
+    ("inputs", "effect", "reason"),
+    [
+        ({"transmission_weight": 1.0}, "transmission", 'material "Leaves" has transmission weight 1'),
+        ({"coat_weight": 0.25}, "coat", 'material "Leaves" has coat weight 0.25'),
+        ({"sheen_weight": 0.5}, "sheen", 'material "Leaves" has sheen weight 0.5'),
+        ({"anisotropic": 0.75}, "anisotropy", 'material "Leaves" has anisotropy 0.75'),
+        ({"thin_film_thickness": 300.0}, "thin film", 'material "Leaves" has thin film thickness 300 nm'),
+        ({"alpha": 0.25}, "transparency", 'material "Leaves" has alpha 0.25'),
+        ({"alpha": 0.25}, "transparent shadows", 'material "Leaves" has alpha 0.25'),
+        ({"alpha": 0.25}, "transparent bounces", 'up to 8: material "Leaves" has alpha 0.25'),
+        ({"subsurface_weight": 0.5, "thin_wall": 1.0}, "thin subsurface",
+         'material "Leaves" has subsurface weight 0.5 in a thin wall'),
+        ({"emits": True, "coat_weight": 1.0, "emission_color": ONE}, "emissive meshes",
+         'material "Leaves" emits light'),
+    ],
+)  # fmt: skip
+def test_what_a_principled_surface_has_is_on_with_its_value(inputs: Inputs, effect: str, reason: str) -> None:
+    effects = surface(**inputs)
+    assert effects[effect] == Effect(True, reason, effects[effect].cost, False, effects[effect].group)
+    assert not surface()[effect].on
+
+
+def test_metal_hides_what_lies_under_it() -> None:
+    effects = surface(metallic=1.0, transmission_weight=1.0, subsurface_weight=1.0)
+    assert not effects["transmission"].on
+    assert effects["subsurface"].state == "off"
+    assert not effects["diffuse bounces"].on
+    assert effects["glossy bounces"].on
+
+
+def test_a_surface_that_cannot_reflect_uses_no_glossy_bounces() -> None:
+    effects = surface(specular_ior_level=0.0)
+    assert effects["glossy bounces"].reason == ("no material that is shown reflects: the limit of 4 cannot matter")
+    assert effects["indirect light"].reason.startswith("4 at most")
+
+
+def test_subsurface_is_named_as_not_supported() -> None:
+    effect = surface(subsurface_weight=0.5)["subsurface"]
+    assert (effect.on, effect.missing, effect.state) == (False, True, "not yet")
+    assert effect.reason == 'material "Leaves" has subsurface weight 0.5: shown as diffuse'
+
+
+def test_a_value_that_varies_counts_as_there() -> None:
+    def build(builder: ProgramBuilder) -> None:
+        closure(builder, "CLOSURE_PRINCIPLED", {**PLAIN, "coat_weight": noise(builder)}, params=(1, 1, 0, 0))
+
+    assert effects_of(scene(build))["coat"].reason == 'material "Leaves" has a coat weight that varies'
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.5])
+def test_a_texture_that_feeds_an_absent_layer_is_not_read(weight: float) -> None:
+    def build(builder: ProgramBuilder) -> None:
+        position = builder.op3("POINT_POSITION", (), (0, 0))
+        grain = builder.op("CHECKER", [*position, *([builder.constant(1.0)] * (OPS["CHECKER"].inputs - 3))], (0,))
+        inputs = {**PLAIN, "coat_weight": weight, "coat_roughness": grain[0]}
+        closure(builder, "CLOSURE_PRINCIPLED", inputs, params=(1, 1, 0, 0))
+
+    effect = effects_of(scene(build))["checker"]
+    assert effect.on == (weight > 0.0)
+    assert effect.reason == ('material "Leaves" reads it' if weight else "no material reads it")
+
+
+def bent(operation: str, strength: float) -> Callable[[ProgramBuilder], None]:
+    def build(builder: ProgramBuilder) -> None:
+        position = builder.op3("POINT_POSITION", (), (0, 0))
+        one = builder.constant(1.0)
+        rest: tuple[Value, ...] = (one, one, position[0], position[1], position[2], *position)
+        if operation == "NORMAL_MAP":
+            rest = position
+        normal = builder.op3(operation, (builder.constant(strength), *rest), (0, 0, 0)[: OPS[operation].params])
+        closure(builder, "CLOSURE_DIFFUSE", {"color": ONE, "normal": normal})
+
+    return build
+
+
+@pytest.mark.parametrize(("operation", "effect"), [("BUMP", "bump"), ("NORMAL_MAP", "normal maps")])
+def test_bent_normals_need_a_strength(operation: str, effect: str) -> None:
+    assert effects_of(scene(bent(operation, 1.0)))[effect].reason == 'material "Leaves" bends the normal'
+    assert not effects_of(scene(bent(operation, 0.0)))[effect].on
+
+
+@pytest.mark.parametrize(
+    ("name", "inputs", "on"),
+    [
+        ("CLOSURE_GLASS", {"color": ONE, "ior": 1.5}, ["transmission", "transmission bounces", "glossy bounces"]),
+        ("CLOSURE_REFRACTION", {"color": ONE, "ior": 1.5}, ["transmission", "transmission bounces"]),
+        ("CLOSURE_TRANSLUCENT", {"color": ONE}, ["translucency", "transmission bounces"]),
+        ("CLOSURE_GLOSSY", {"color": ONE, "roughness": 0.5, "anisotropy": -0.5}, ["anisotropy", "glossy bounces"]),
+        ("CLOSURE_METALLIC", {"base_color": ONE, "thin_film_thickness": 9.0}, ["thin film", "glossy bounces"]),
+        ("CLOSURE_SHEEN", {"color": ONE, "roughness": 0.5}, ["sheen", "glossy bounces"]),
+        ("CLOSURE_TOON", {"color": ONE, "size": 0.5}, ["glossy bounces"]),
+        ("CLOSURE_DIFFUSE", {"color": ONE}, ["diffuse bounces"]),
+    ],
+)
+def test_closures_alone_bring_their_own_bounces(name: str, inputs: Inputs, on: list[str]) -> None:
+    effects = effects_of(scene(lambda b: closure(b, name, inputs)))
+    rest = {"indirect light", "pass Combined"}
+    assert set(effects.names(on=True)) == {*on, *rest}
+
+
+def test_a_bounce_limit_of_zero_is_told() -> None:
+    subject = scene(principled, settings=Settings(diffuse_bounces=0, max_bounces=3))
+    effects = effects_of(subject)
+    assert effects["diffuse bounces"].reason == 'set to 0, though material "Leaves" scatters diffusely'
+    assert effects["indirect light"].reason == "3 at most: what the kinds that are on allow, up to 3"
+    subject.settings.max_bounces = 0
+    assert effects_of(subject)["indirect light"].reason == "Max Bounces is 0: direct light alone"
+
+
+def test_transparent_shadows_can_be_off_where_transparency_is_on() -> None:
+    subject = scene(lambda b: principled(b, alpha=0.5))
+    subject.materials[0].transparent_shadows = False
+    assert effects_of(subject)["transparent shadows"].reason == 'Transparent Shadows is disabled in material "Leaves"'
+    subject.objects[0].visibility = 31  # all but shadow
+    assert effects_of(subject)["transparent shadows"].reason == 'no object with material "Leaves" casts a shadow'
+    assert effects_of(subject)["transparency"].on
+
+
+def test_a_material_on_no_face_changes_nothing_and_says_so() -> None:
+    subject = scene(principled)
+    subject.materials.append(Material("Pane", program(lambda b: principled(b, transmission_weight=1.0))))
+    subject.objects[0].materials.append(1)
+    effect = effects_of(subject)["transmission"]
+    assert not effect.on
+    assert effect.reason.endswith('(material "Pane" has transmission weight 1, but is on no face that is drawn)')
+    subject.meshes[0].material_slots = np.full(1, 7, np.uint16)  # beyond the last: the last
+    assert effects_of(subject)["transmission"].on
+
+
+def test_holdouts_are_objects_or_materials() -> None:
+    def build(builder: ProgramBuilder) -> None:
+        builder.closure("CLOSURE_HOLDOUT", builder.vector(*ONE))
+
+    assert effects_of(scene(build))["holdout"].reason == 'material "Leaves" has a Holdout'
+    subject = scene(principled)
+    assert effects_of(subject)["holdout"].reason == "no object and no material is a holdout"
+    subject.objects[0].holdout = True
+    assert effects_of(subject)["holdout"].reason == 'object "Tree" is a holdout'
+
+
+LAMP_KINDS = {"POINT": "point lamps", "SPOT": "spot lamps", "SUN": "sun lamps", "AREA": "area lamps"}
+
+
+@pytest.mark.parametrize(("kind", "effect"), LAMP_KINDS.items())
+def test_lamps_are_told_by_type(kind: str, effect: str) -> None:
+    lamp = Light("Key", kind, radius=0.1, angle=0.01)
+    effects = effects_of(scene(principled, lights=[lamp]))
+    assert effects[effect].reason == '"Key"'
+    assert effects["soft shadows of lamps"].reason == 'lamp "Key" has a size'
+    assert effects["visible lamps"].on == (kind != "SUN")
+    others = set(LAMP_KINDS.values()) - {effect}
+    assert all(effects[other].reason == "the scene has none" for other in others)
+    lamp.power = 0.0
+    assert effects_of(scene(principled, lights=[lamp]))[effect].reason == '"Key" has no power'
+
+
+def test_point_like_lamps_are_neither_soft_nor_visible() -> None:
+    lamps = [Light("Bulb", "POINT"), Light("Sun", "SUN")]
+    effects = effects_of(scene(principled, lights=lamps))
+    assert effects["soft shadows of lamps"].reason == "no lamp has a size"
+    assert effects["visible lamps"].reason == "no lamp has a size"
+    assert effects["light tree"].reason == "there is one light: nothing to choose"
+
+
+def test_the_light_tree_counts_lamps_and_emissive_triangles() -> None:
+    def build(builder: ProgramBuilder) -> None:
+        builder.closure("CLOSURE_EMISSION", builder.vector(*ONE))
+
+    subject = scene(build, copies=3, lights=[Light("Bulb", "POINT")])
+    effects = effects_of(subject)
+    assert effects["emissive meshes"].cost == "3 triangles are lights to choose from"
+    assert effects["light tree"].reason == "chooses among 4 lights"
+    subject.materials[0].emission_sampling = "NONE"
+    effects = effects_of(subject)
+    assert effects["emissive meshes"].cost == "found by chance alone: not sampled"
+    assert not effects["light tree"].on
+    subject.settings.light_tree = False
+    assert effects_of(subject)["light tree"].reason.startswith("Light Tree is disabled")
+    assert effects_of(scene(principled))["emissive meshes"].reason == "no material emits light"
+
+
+def sky(builder: ProgramBuilder, name: str) -> None:
+    position = builder.op3("POINT_POSITION", (), (0, 0))
+    read = (*position, *([builder.constant(0.5)] * (OPS[name].inputs - 3)))[: OPS[name].inputs]
+    color = builder.op(name, read, (0,) * OPS[name].params)
+    builder.closure("CLOSURE_EMISSION", (color[0], color[-1], color[0]))
+
+
+@pytest.mark.parametrize(
+    ("operation", "effect", "reason"),
+    [
+        ("ENVIRONMENT", "environment image", 'world "Day" shows an image'),
+        ("SKY_ATMOSPHERE", "sky", 'world "Day" shows a Sky Texture'),
+        ("NOISE_3D", "procedural world", 'world "Day" shows a procedural texture'),
+    ],
+)
+def test_the_world_is_told_by_what_it_shows(operation: str, effect: str, reason: str) -> None:
+    effects = effects_of(scene(principled, world=World("Day", program(lambda b: sky(b, operation)))))
+    worlds = {"world colour", "environment image", "sky", "procedural world", "world light sampling"}
+    assert worlds & set(effects.names(on=True)) == {effect, "world light sampling"}
+    assert effects[effect].reason == reason
+
+
+def test_a_world_of_one_colour_needs_no_sampling() -> None:
+    def grey(strength: float) -> Effects:
+        build = program(lambda b: b.closure("CLOSURE_EMISSION", b.vector(strength, strength, strength)))
+        return effects_of(scene(principled, world=World("Day", build)))
+
+    assert grey(0.5)["world colour"].reason == 'world "Day" has one colour, 0.5 0.5 0.5'
+    assert grey(0.5)["world light sampling"].reason.endswith("no direction is better than another")
+    assert grey(0.0)["world colour"].reason == 'world "Day" is black'
+    assert effects_of(scene(principled))["sky"].reason == "the scene has no world"
+
+
+def test_depth_of_field_tells_an_f_stop_that_is_set_in_vain() -> None:
+    effects = effects_of(scene(principled, camera=Camera(fstop=1.4, use_dof=False)))
+    reason = "the f-stop is set (f/1.4) but the camera's Depth of Field is disabled"
+    assert effects["depth of field"] == Effect(False, reason, group="Camera")
+    effects = effects_of(scene(principled, camera=Camera(fstop=1.4, use_dof=True, focus_distance=3.0, blades=6)))
+    assert effects["depth of field"].reason == "f/1.4, in focus at 3 m"
+    assert effects["aperture blades"].on
+
+
+def test_instancing_is_on_where_a_mesh_is_drawn_twice() -> None:
+    effect = effects_of(scene(principled, copies=120))["instancing"]
+    assert (effect.on, effect.reason, effect.cost) == (True, "1 mesh is drawn 120 times", "saves 119 triangles")
+    assert effects_of(scene(principled))["instancing"].reason == "every mesh is drawn once"
+
+
+@pytest.mark.parametrize("effect", ["motion blur", "hair", "point clouds", "volumes", "displacement", "subsurface"])
+def test_what_the_exporter_left_out_is_named_in_its_own_words(effect: str) -> None:
+    subject = scene(principled)
+    assert effects_of(subject)[effect].state == "off"
+    subject.unsupported = {effect: ["It is left out."]}
+    assert effects_of(subject)[effect].state == "not yet"
+    assert "It is left out." in effects_of(subject)[effect].reason
+
+
+def test_every_pass_is_an_effect_with_its_bytes() -> None:
+    for name, numbers in PASSES.items():
+        if name == "Combined":
+            continue
+        film = Film(passes=["Combined", name])
+        effect = effects_of(scene(principled, film=film))[f"pass {name}"]
+        assert effect.on
+        assert effect.cost.startswith(f"{8 * numbers or 4} bytes a pixel")
+        assert not effects_of(scene(principled))[f"pass {name}"].on
+    film = Film(passes=["Combined", "CryptoObject00"], cryptomatte_depth=2, aovs=[("Wear", "VALUE")], lightgroups=["A"])
+    effects = effects_of(scene(principled, film=film))
+    assert effects["cryptomatte"].reason == "Object: 2 names a pixel"
+    assert effects["AOVs"].reason == "Wear"
+    assert effects["light groups"].cost == "24 bytes a pixel"
+
+
+def test_settings_that_cut_light_are_effects() -> None:
+    settings = Settings(clamp_indirect=10.0, filter_glossy=1.0, caustics_reflective=False)
+    effects = effects_of(scene(principled, settings=settings, film=Film(transparent=True)))
+    assert effects["clamping"].reason == "indirect light above 10 is cut"
+    assert effects["filter glossy"].reason == "Filter Glossy is 1"
+    assert effects["reflective caustics"].reason == "Caustics > Reflective is disabled"
+    assert effects["transparent film"].on
+
+
+def test_images_are_counted_once_with_their_bytes() -> None:
+    def build(builder: ProgramBuilder) -> None:
+        position = builder.op3("POINT_POSITION", (), (0, 0))
+        color = builder.op("IMAGE", position, (builder.image(0), 0, 0, 0, 0))
+        tiled = builder.op("IMAGE", position, (2, 0, 0, 0, 2, 1001, builder.image(0), 1002, builder.image(1)))
+        closure(builder, "CLOSURE_DIFFUSE", {"color": (color[0], tiled[1], color[2])})
+
+    images = [Image("A", np.zeros((500, 500, 4), np.uint8)), Image("B", np.zeros((500, 500, 4), np.uint8))]
+    effect = effects_of(scene(build, images=images))["image textures"]
+    assert effect.cost == "2 images, 2.0 MB"
+
+
+def test_the_list_can_be_read_by_people_and_by_programs() -> None:
+    effects = surface(alpha=0.5)
+    rows = json.loads(json.dumps(effects.as_dict()))
+    assert rows["transparency"] == {"on": True, "reason": 'material "Leaves" has alpha 0.5', "group": "Surfaces"}
+    assert set(rows) == set(effects)
+    text = str(effects)
+    assert re.search(r'on +transparency +material "Leaves" has alpha 0\.5', text)
+    assert re.search(r"off +depth of field +the f-stop is set", text)
+    assert max(map(len, text.splitlines())) <= 118
+    assert summary(rows).startswith("transparency, transparent shadows, ")
+
+
+def test_a_program_is_read_back_as_it_was_built() -> None:
+    build = program(bent("BUMP", 1.0))
+    nodes, constants = decode(build)
+    assert [node.op.name for node in nodes] == ["POINT_POSITION", "BUMP", "CLOSURE_DIFFUSE"]
+    assert [constants.get(value) for value in nodes[-1].inputs[:7]] == [1.0] * 6 + [0.0]
+    assert read_program(build).has("BUMP")
+    build.code[0] = 0xFFFF
+    with pytest.raises(ValueError, match="word 0 of a shader program is no operation"):
+        decode(build)
+
+
+def test_an_aov_that_the_film_does_not_keep_is_dead() -> None:
+    def build(builder: ProgramBuilder) -> None:
+        position = builder.op3("POINT_POSITION", (), (0, 0))
+        shade: Vector = builder.op("MAGIC", (*position, *builder.vector(1.0, 1.0, 1.0))[: OPS["MAGIC"].inputs], (2,))[
+            :3
+        ]  # type: ignore[assignment]
+        builder.closure("STORE_AOV", None, (*shade, builder.constant(1.0)), (builder.aov("Wear"),))
+
+    assert not effects_of(scene(build))["magic"].on
+    assert effects_of(scene(build, film=Film(aovs=[("Wear", "COLOR")])))["magic"].on
