@@ -14,6 +14,8 @@ std::unique_ptr<Structure> build_structure(StructureKind kind, const StructureIn
             return build_bvh2_stackless(input, pool);
         case StructureKind::GRID:
             return build_grid(input, pool);
+        case StructureKind::HIERARCHICAL_GRID:
+            return build_hierarchical_grid(input, pool);
         case StructureKind::KD_TREE:
             return build_kd_tree(input, pool);
         case StructureKind::CWBVH:

@@ -99,6 +99,7 @@ std::unique_ptr<Structure> build_brute_force(const StructureInput& input, Thread
 std::unique_ptr<Structure> build_bvh2(const StructureInput& input, ThreadPool& pool);
 std::unique_ptr<Structure> build_bvh2_stackless(const StructureInput& input, ThreadPool& pool);
 std::unique_ptr<Structure> build_grid(const StructureInput& input, ThreadPool& pool);
+std::unique_ptr<Structure> build_hierarchical_grid(const StructureInput& input, ThreadPool& pool);
 std::unique_ptr<Structure> build_kd_tree(const StructureInput& input, ThreadPool& pool);
 std::unique_ptr<Structure> build_cwbvh(const StructureInput& input, ThreadPool& pool);
 

@@ -50,17 +50,27 @@ LUCH_FN u32 spread_bits(u32 i, u32 mask) {
 // What of a ray the walks need.
 struct GridRay {
     Vec3 origin, direction;
-    float steepest;  // of the direction's components, absolute
+    float steepest;             // of the direction's components, absolute
+    float nearest_d, farthest_d;  // D that GridLine's numbers can hold
+    float rdir[3];              // 0: as good as parallel to the axis' planes
+
     LUCH_FN explicit GridRay(const Ray& ray)
-        : origin(ray.origin), direction(ray.direction), steepest(max_component(abs_v(ray.direction))) {}
+        : origin(ray.origin), direction(ray.direction), steepest(max_component(abs_v(ray.direction))) {
+        bool in_range = steepest >= 1e-30f && steepest <= 1e30f;
+        nearest_d = in_range ? 1e-24f * steepest : INFINITE_DISTANCE;
+        farthest_d = 1e24f * steepest;
+        for (int axis = 0; axis < 3; ++axis) {
+            float d = direction[axis];
+            rdir[axis] = abs_f(d) <= EPS * steepest ? 0.0f : 1.0f / d;
+        }
+    }
 };
 
-// Whether GridLine may walk this grid: the margin holds its doubt, and no number below leaves the range.
+// Whether GridLine may walk this grid: the margin holds its doubt, and no number leaves the range.
 LUCH_FN bool grid_line_serves(const GridShape& grid, const GridRay& ray) {
     Vec3 away = max_v(abs_v(grid.lo - ray.origin), abs_v(grid.hi - ray.origin));
-    float d = max_component(away), duration = d / ray.steepest;
-    bool in_range = ray.steepest >= 1e-30f && ray.steepest <= 1e30f && duration >= 1e-24f && duration <= 1e24f;
-    return d <= grid.reach && in_range;
+    float d = max_component(away);
+    return d <= grid.reach && d >= ray.nearest_d && d <= ray.farthest_d;
 }
 
 struct GridLine {
@@ -77,8 +87,8 @@ struct GridLine {
             u32 i = at > 0.0f ? (at < float(most) ? u32(at) : most) : 0u;
             mask = grid.mask[axis];
             code = spread_bits(i, mask);
-            bool negative = d < 0.0f, parallel = abs_f(d) <= EPS * ray.steepest;
-            float rdir = parallel ? 0.0f : 1.0f / d;
+            float rdir = ray.rdir[axis];
+            bool negative = d < 0.0f, parallel = rdir == 0.0f;
             base = -relative * rdir;
             delta = grid.width[axis] * rdir;
             step = negative ? -1.0f : 1.0f;
@@ -118,14 +128,12 @@ struct GridLine {
 
 struct GridSlabs {
     const GridShape* grid;
-    GridRay ray;
-    float t0, t1;       // of the ray in the grid
+    float t0, t1;  // of the ray in the grid
     int axis, across[2];
     u32 layer, layers_left;
     u32 first[2], last[2], at[2];  // cells of the layer that the cone may meet
     float from, to;
 
-    LUCH_FN explicit GridSlabs(const GridRay& along) : ray(along) {}
     LUCH_FN double plane(int a, u32 k) const {
         if (k == 0) return double(grid->lo[a]);
         return k == grid->size[a] ? double(grid->hi[a]) : double(grid->lo[a]) + double(k) * double(grid->width[a]);
@@ -135,7 +143,7 @@ struct GridSlabs {
         u32 most = grid->size[a] - 1;
         return i > 0 ? (i < double(most) ? u32(i) : most) : 0u;  // NaN, a cell without width: 0
     }
-    LUCH_FN bool begin(const GridShape& shape, float begin_t, float end_t) {
+    LUCH_FN bool begin(const GridShape& shape, const GridRay& ray, float begin_t, float end_t) {
         grid = &shape;
         t0 = begin_t;
         t1 = end_t;
@@ -145,10 +153,10 @@ struct GridSlabs {
         across[1] = axis == 2 ? 1 : 2;
         layers_left = grid->size[axis];
         layer = ray.direction[axis] < 0.0f ? layers_left : ~0u;  // one before the first
-        return next_layer(end_t);
+        return next_layer(ray, end_t);
     }
     // The interval in which the cone may be in the layer, and its cells; false if that is over or behind.
-    LUCH_FN bool enter_layer() {
+    LUCH_FN bool enter_layer(const GridRay& ray) {
         bool negative = ray.direction[axis] < 0.0f;
         double o = double(ray.origin[axis]), d = double(ray.steepest), most = double(GRID_DOUBT) * double(EPS);
         double near_by = negative ? o - plane(axis, layer + 1) : plane(axis, layer) - o;
@@ -169,11 +177,11 @@ struct GridSlabs {
         }
         return true;
     }
-    LUCH_FN bool next_layer(float limit) {
+    LUCH_FN bool next_layer(const GridRay& ray, float limit) {
         while (layers_left > 0) {
             --layers_left;
             layer += ray.direction[axis] < 0.0f ? ~0u : 1u;
-            if (enter_layer()) return from <= limit;
+            if (enter_layer(ray)) return from <= limit;
         }
         return false;
     }
@@ -181,11 +189,11 @@ struct GridSlabs {
         return spread_bits(layer, grid->mask[axis]) | spread_bits(at[0], grid->mask[across[0]]) |
                spread_bits(at[1], grid->mask[across[1]]);
     }
-    LUCH_FN bool advance(float limit) {
+    LUCH_FN bool advance(const GridRay& ray, float limit) {
         if (!(from <= limit)) return false;
         if (at[0]++ < last[0]) return true;
         at[0] = first[0];
-        return at[1]++ < last[1] || next_layer(limit);
+        return at[1]++ < last[1] || next_layer(ray, limit);
     }
 };
 
@@ -209,11 +217,11 @@ LUCH_FN void walk_grid(const Grid& grid, const Ray& ray, Leaf& leaf, Count& coun
         } while (line.advance(min_f(leaf.limit(), t1)));
         return;
     }
-    GridSlabs slabs(along);
-    if (!slabs.begin(grid.shape, t0, t1)) return;
+    GridSlabs slabs;
+    if (!slabs.begin(grid.shape, along, t0, t1)) return;
     do {
         if (offer(slabs.cell())) return;
-    } while (slabs.advance(min_f(leaf.limit(), t1)));
+    } while (slabs.advance(along, min_f(leaf.limit(), t1)));
 }
 
 template <Precision P, class Count>
