@@ -18,5 +18,6 @@ void bind_shade(py::module_& m);
 void bind_sky(py::module_& m);
 void bind_structure(py::module_& m);
 void bind_textures(py::module_& m);
+void bind_triangle_tests(py::module_& m);
 
 }  // namespace luch::bindings

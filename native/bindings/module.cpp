@@ -14,4 +14,5 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_sky(m);
     luch::bindings::bind_structure(m);
     luch::bindings::bind_textures(m);
+    luch::bindings::bind_triangle_tests(m);
 }
