@@ -95,7 +95,7 @@ template <Precision P, bool ANY>
 struct Walker {
     Aside<P>* aside;
     WideRay wide;
-    float first, last;
+    float last;
     WaitingGroup group;
     u8 blocked;
     bool busy;
@@ -111,7 +111,6 @@ struct Walker {
         aside->tested = PrimitiveRay<P>(ray);
         aside->t_min = ray.t_min;
         wide = make_wide_ray(ray, tree.root);
-        first = wide.lower(ray.t_min);
         last = wide.upper(ray.t_max);
         group = {0, 0x80000000u};
         stack->size = 0;
@@ -135,7 +134,7 @@ struct Walker {
         group.hits &= ~(1u << bit);
         if (has_nodes(group)) stack->push(group);
         const CwbvhNode node = load_quads(tree.nodes + child);
-        u32 hits = intersect_children(node, wide, first, last);
+        u32 hits = intersect_children(node, wide, last);
         group = {node.first_child, (hits & 0xff000000u) | node.exponents >> 24};
         return {node.first_leaf, hits & 0x00ffffffu};
     }

@@ -57,8 +57,9 @@ struct LocalStack {
     LUCH_FN static bool postpones_leaves() { return false; }  // true: too few rays of the warp are at leaves
 };
 
-// Bits of what the ray may hit in a node within [first, last]: 31..24 children, 23..0 primitives.
-LUCH_FN u32 intersect_children(const CwbvhNode& node, const WideRay& ray, float first, float last) {
+// Bits of what the ray may hit in a node up to the distance `last`: 31..24 children, 23..0 primitives. The ray's lower
+// end does not count: it is mostly 0, and then no box is entered before it.
+LUCH_FN u32 intersect_children(const CwbvhNode& node, const WideRay& ray, float last) {
     WidePlanes planes;
     for (int axis = 0; axis < 3; ++axis)
         prepare_axis(ray, axis, node.grid[axis], node.exponents >> (8 * axis) & 0xffu, &planes);
@@ -66,7 +67,7 @@ LUCH_FN u32 intersect_children(const CwbvhNode& node, const WideRay& ray, float 
     for (int half = 0; half < 2; ++half) {
         u32 meta = node.meta[half];
         u32 inner = ((meta & meta << 1) >> 4 & 0x01010101u) * 0xffu;  // 255 for inner children
-        u32 bit = (meta ^ (order & inner)) & 0x1f1f1f1fu, count = meta >> 5 & 0x07070707u;
+        u32 bit = meta ^ (order & inner);                             // the lower five of each byte
         u32 near_plane[3], far_plane[3];
         for (int axis = 0; axis < 3; ++axis) {
             bool negative = ray.negative(axis);
@@ -74,16 +75,17 @@ LUCH_FN u32 intersect_children(const CwbvhNode& node, const WideRay& ray, float 
             far_plane[axis] = negative ? node.lo[axis][half] : node.hi[axis][half];
         }
         for (u32 i = 0; i < 4; ++i) {
-            float enter = first, leave = last;
-            for (int axis = 0; axis < 3; ++axis) {  // NaN: the axis does not count
-                enter = larger(fused(byte_above_32768(near_plane[axis], i, ray.byte_bias), planes.near_step[axis],
-                                     planes.near_base[axis]),
-                               enter);
-                leave = smaller(fused(byte_above_32768(far_plane[axis], i, ray.byte_bias), planes.far_step[axis],
-                                      planes.far_base[axis]),
-                                leave);
+            float enter[3], leave[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                float near_byte = byte_above_32768(near_plane[axis], i, ray.byte_bias);
+                float far_byte = byte_above_32768(far_plane[axis], i, ray.byte_bias);
+                enter[axis] = fused(near_byte, planes.near_step[axis], planes.near_base[axis]);
+                leave[axis] = fused(far_byte, planes.far_step[axis], planes.far_base[axis]);
             }
-            if (enter <= leave) hits |= (count >> (8 * i) & 0xffu) << (bit >> (8 * i) & 0xffu);
+            float from = largest_or_zero(enter[0], enter[1], enter[2]);
+            float to = smaller(smallest(leave[0], leave[1], leave[2]), last);
+            u32 unary = meta >> (8 * i + 5) & 7u;
+            if (!(from > to)) hits |= unary << (bit >> (8 * i) & 31u);  // NaN: entered
         }
     }
     return hits;
@@ -91,10 +93,10 @@ LUCH_FN u32 intersect_children(const CwbvhNode& node, const WideRay& ray, float 
 
 // Calls leaf(primitive) for all that the ray may hit before leaf.t_max(), until it returns true.
 template <class Stack, class Leaf, class Count>
-LUCH_FN void walk(const Cwbvh& tree, const WideRay& ray, float t_min, Stack& stack, Leaf& leaf, Count& count) {
+LUCH_FN void walk(const Cwbvh& tree, const WideRay& ray, Stack& stack, Leaf& leaf, Count& count) {
     if (tree.node_count == 0) return;
     WaitingGroup group = {0, 0x80000000u};
-    float first = ray.lower(t_min), last = ray.upper(leaf.t_max());
+    float last = ray.upper(leaf.t_max());
     for (;;) {
         WaitingGroup leaves = {group.first, group.hits & 0x00ffffffu};
         if (has_nodes(group)) {
@@ -104,7 +106,7 @@ LUCH_FN void walk(const Cwbvh& tree, const WideRay& ray, float t_min, Stack& sta
             if (has_nodes(group)) stack.push(group);
             const CwbvhNode node = tree.nodes[index];
             count.node(sizeof(CwbvhNode), 8);
-            u32 hits = intersect_children(node, ray, first, last);
+            u32 hits = intersect_children(node, ray, last);
             group = {node.first_child, (hits & 0xff000000u) | node.exponents >> 24};
             leaves = {node.first_leaf, hits & 0x00ffffffu};
         } else {
@@ -170,12 +172,12 @@ struct AnyOfLeaves {
 template <Precision P, class Stack, class Count>
 LUCH_FN void closest_hit(const Cwbvh& tree, const Ray& ray, Stack& stack, RefHit* best, Count& count) {
     ClosestOfLeaves<P, Count> leaf = {PrimitiveRay<P>(ray), ray.t_min, best, count};
-    walk(tree, make_wide_ray(ray, tree.root), ray.t_min, stack, leaf, count);
+    walk(tree, make_wide_ray(ray, tree.root), stack, leaf, count);
 }
 template <Precision P, class Stack, class Count>
 LUCH_FN u8 any_hit(const Cwbvh& tree, const Ray& ray, Stack& stack, Count& count) {
     AnyOfLeaves<P, Count> leaf = {PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count};
-    walk(tree, make_wide_ray(ray, tree.root), ray.t_min, stack, leaf, count);
+    walk(tree, make_wide_ray(ray, tree.root), stack, leaf, count);
     return leaf.blocked;
 }
 

@@ -37,6 +37,20 @@ LUCH_FN float byte_above_32768(u32 x, u32 i, u32 bias) { return bits_float(__byt
 LUCH_FN float byte_above_32768(u32 x, u32 i, u32) { return byte_above_32768(x, i); }
 #endif
 
+// Of three numbers. On CUDA as integers, in one instruction since sm_90: a NaN is dropped or comes out, and if any number
+// is negative, smallest gives a negative one.
+#if LUCH_CUDA
+LUCH_FN float largest_or_zero(float a, float b, float c) {
+    return __int_as_float(__vimax3_s32_relu(__float_as_int(a), __float_as_int(b), __float_as_int(c)));
+}
+LUCH_FN float smallest(float a, float b, float c) {
+    return __int_as_float(__vimin3_s32(__float_as_int(a), __float_as_int(b), __float_as_int(c)));
+}
+#else
+LUCH_FN float largest_or_zero(float a, float b, float c) { return larger(c, larger(b, larger(a, 0.0f))); }
+LUCH_FN float smallest(float a, float b, float c) { return smaller(a, smaller(b, smaller(c, INFINITE_DISTANCE))); }
+#endif
+
 struct WideRay {
     float origin[3];
     float near_rdir[3], far_rdir[3];  // signed
@@ -46,7 +60,6 @@ struct WideRay {
     u32 byte_bias;  // BYTE_BIAS
     // Never below the distance of a hit at t.
     LUCH_FN float upper(float t) const { return fused(t, scale * (1.0f + 4.0f * EPS), 1e-37f); }
-    LUCH_FN float lower(float t) const { return fused(t, scale * (1.0f - 4.0f * EPS), -1e-37f); }
     LUCH_FN bool negative(int axis) const { return octant >> (2 - axis) & 1u; }
 };
 
