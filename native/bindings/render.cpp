@@ -48,6 +48,12 @@ class PyRenderer {
         d["lights_seconds"] = s.lights_seconds;
         d["trace_seconds"] = s.trace_seconds;
         d["scene_bytes"] = s.scene_bytes;
+        d["film_pixel_bytes"] = s.film_pixel_bytes;
+        d["lens_samples"] = s.counts.lens_samples;
+        d["lamp_searches"] = s.counts.lamp_searches;
+        d["transparent_steps"] = s.counts.transparent_steps;
+        d["world_points"] = s.counts.world_points;
+        d["light_points"] = s.counts.light_points;
         return d;
     }
 

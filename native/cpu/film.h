@@ -59,6 +59,8 @@ class Film {
     const std::vector<Pass>& passes() const { return passes_; }  // Combined first
     u32 width() const { return spec_.width; }
     u32 height() const { return spec_.height; }
+    // Bytes of one pixel: its row of sums and its sample count.
+    u64 pixel_bytes() const { return u64(layout_.stride) * sizeof(FilmSum) + sizeof(u32); }
 
     // Writes every pass: out[i] holds height * width * passes()[i].channels floats, bottom row first. Pixels
     // without samples are 0.

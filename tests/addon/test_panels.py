@@ -8,7 +8,8 @@ from typing import Any
 import bpy
 import pytest
 
-from addon.ui import datablocks, panels, stock
+from addon import engine
+from addon.ui import datablocks, effects, panels, stock
 
 
 class Layout:
@@ -21,7 +22,8 @@ class Layout:
         assert name in owner.bl_rna.properties, f"{owner.bl_rna.identifier} has no property {name}"
         self.drawn.append(name)
 
-    def label(self, text: str) -> None:
+    def label(self, text: str, icon: str = "NONE") -> None:
+        assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.drawn.append(text)
 
     def operator(self, identifier: str, **options: object) -> None:
@@ -87,6 +89,27 @@ def test_a_value_that_comes_from_cycles_stands_beside_the_setting(scene: bpy.typ
     assert "Cycles: 77" in draw(panels.LUCH_RENDER_PT_sampling, scene)
     scene.luch.samples = 5
     assert "Cycles: 77" not in draw(panels.LUCH_RENDER_PT_sampling, scene)
+
+
+def test_effects_of_the_last_render_are_listed_with_their_reasons(
+    scene: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = {"region": SimpleNamespace(width=400), "preferences": bpy.context.preferences}
+    monkeypatch.setattr(engine, "last_stats", {})
+    assert draw(effects.LUCH_RENDER_PT_effects, scene, **context) == ["Known after the first render"]
+    off = SimpleNamespace(scene=scene, engine="LUCH")
+    assert not effects.LUCH_RENDER_PT_effects_off.poll(off)
+    rows = {
+        "coat": {"on": True, "reason": "a coat " * 20, "group": "Surfaces", "cost": "a lobe"},
+        "volumes": {"on": False, "reason": "left out", "group": "Geometry", "missing": True},
+        "sheen": {"on": False, "reason": "every sheen weight is 0", "group": "Surfaces"},
+    }
+    monkeypatch.setattr(engine, "last_stats", {scene.name: {"effects": rows}})
+    shown = draw(effects.LUCH_RENDER_PT_effects, scene, **context)
+    assert [text for text in shown if not text.startswith(" ")] == ["Surfaces", "coat", "Geometry", "volumes"]
+    assert "(a lobe)" in shown[-4] and max(map(len, shown)) <= 400 / 8 + 4
+    hidden = draw(effects.LUCH_RENDER_PT_effects_off, scene, **context)
+    assert hidden == ["Surfaces", "sheen", "    every sheen weight is 0"]
 
 
 def test_settings_follow_cycles_again_at_a_press(scene: bpy.types.Scene) -> None:

@@ -33,6 +33,19 @@ Batch::Batch(const RenderScene& scene, const FilmView& film)
 
 Batch::~Batch() = default;
 
+void BatchCounts::add(const BatchCounts& other) {
+    paths += other.paths;
+    rays += other.rays;
+    shadow_rays += other.shadow_rays;
+    surface_points += other.surface_points;
+    bad_samples += other.bad_samples;
+    lens_samples += other.lens_samples;
+    lamp_searches += other.lamp_searches;
+    transparent_steps += other.transparent_steps;
+    world_points += other.world_points;
+    light_points += other.light_points;
+}
+
 BatchCounts Batch::counts() const {
     BatchCounts counts = counts_;
     counts.bad_samples += writer_.rejected;
@@ -87,6 +100,7 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
     for (u32 i = 0; i < count && scene_.camera.aperture_radius > 0.0f; i++) {
         Vec2 u = sample_2d(make_sampler(pixel, first_sample + i), 1);
         lens_u[0][i] = u.x, lens_u[1][i] = u.y;
+        counts_.lens_samples++;
     }
     for (u32 i = 0; i < count; i++) {
         int k = ray_count_++;
@@ -121,6 +135,7 @@ void Batch::traverse() {
 // Lamps do not stop rays: every lamp in front of the surface adds its light.
 void Batch::find_lamps() {
     if (!scene_.has_visible_lamps) return;
+    counts_.lamp_searches += u64(ray_count_);
     for (int k = 0; k < ray_count_; k++) {
         PathState& path = paths_[ray_path_[k]];
         Ray ray = rays_[k];
@@ -183,6 +198,7 @@ void Batch::add_world(const u32* queue, int count) {
     if (scene_.world_emission.constant) {
         for (int i = 0; i < count; i++) radiance[i] = scene_.world_emission.radiance;
     } else {
+        counts_.world_points += u64(count);
         ShadePoints& points = scratch_->light_points;
         points.count = count;
         for (int i = 0; i < count; i++) {
@@ -232,11 +248,20 @@ void Batch::sort_hits_by_material() {
     // material_first_[m] has moved to the end of group m, the start of group m + 1.
 }
 
+// After its last bounce a path brings back nothing but light that it meets, unless the film or a denoiser's pass
+// waits for what lies behind.
+bool Batch::looks_for_light_alone(const PathState& path) {
+    constexpr u32 more = u32(PATH_FEATURES) | u32(PATH_THROUGH_FILM);
+    return (path.flags & PATH_LAST_BOUNCE) && !(path.flags & more);
+}
+
 // Decides Russian roulette before shading: a path that ends on a surface without emission is dropped unseen.
 bool Batch::survives(PathState& path, const MaterialView& material) {
     path.continuation = continuation_probability(path, scene_.limits);
     bool emits = material.program.flags & PROGRAM_EMISSION;
     if (path.flags & PATH_ENDS_AT_SURFACE) return emits;
+    bool lets_through = material.program.flags & PROGRAM_TRANSPARENT;
+    if (!emits && !lets_through && looks_for_light_alone(path)) return false;
     if (path.continuation == 1.0f) return true;
     float u = sample_1d(path.sampler, path.dimension + DIM_TERMINATE);
     if (path.continuation > 0.0f && u < path.continuation) return true;

@@ -32,6 +32,13 @@ struct ShadowRay {
 
 struct BatchCounts {
     u64 paths = 0, rays = 0, shadow_rays = 0, surface_points = 0, bad_samples = 0;
+    u64 lens_samples = 0;       // camera rays that chose a point of the aperture
+    u64 lamp_searches = 0;      // rays that looked for lamps on their way
+    u64 transparent_steps = 0;  // surfaces that shadow rays looked through, one by one
+    u64 world_points = 0;       // directions in which the world's program ran for a ray
+    u64 light_points = 0;       // points on lights at which a program ran
+
+    void add(const BatchCounts& other);
 };
 
 struct PixelBlock {
@@ -63,6 +70,7 @@ class Batch {
     void sort_hits_by_material();
     bool wants_features() const;
     bool survives(PathState& path, const MaterialView& material);
+    static bool looks_for_light_alone(const PathState& path);
     void shade_hits();
     void trace_shadows();
     u32 film_pixel(u32 x, u32 y) const;  // of a pixel of the full frame

@@ -118,6 +118,7 @@ void Batch::emission_of_samples(const u32* queue, const int* lanes, int count) {
         open_count = left;
         ShadePoints& points = scratch_->light_points;
         points.count = chosen_count;
+        counts_.light_points += u64(chosen_count);
         for (int i = 0; i < chosen_count; i++) setup_light_lane(queue[chosen[i]], chosen[i], points, i);
         run_program(scene_.view, *program, points, scratch_->light_sets, registers_.data(), nullptr, 0, Wanted::LIGHT);
         for (int i = 0; i < chosen_count; i++) scratch_->emission[chosen[i]] = scratch_->light_sets[i].emission;
@@ -196,6 +197,7 @@ Color Batch::walk_transparent(const Ray& shadow, const PathState& path) {
         if (passed == scene_.limits.transparent) return make_vec3(0.0f);
         const MaterialView& material = scene_.view.materials[material_at(scene_.view, hit.instance, hit.prim)];
         if (!(material.program.flags & PROGRAM_TRANSPARENT) || !material.transparent_shadows) return make_vec3(0.0f);
+        counts_.transparent_steps++;
         SurfacePoint spot = surface_point(scene_.view, hit);
         ShadePoints& points = scratch_->light_points;
         points.count = 1;

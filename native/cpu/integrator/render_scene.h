@@ -26,7 +26,8 @@ struct RenderScene {
     u32 log2_samples = 0;           // the sampler leaves this much room for each pixel
     bool has_lights = false;        // anything that sample_light could choose
     bool has_visible_lamps = false; // lamps of finite size that rays may meet
-    bool has_world = false;
+    bool has_world = false;         // one that is not black
+    bool can_meet_light = true;     // a ray may come upon an emitter, a lamp or the world by itself
     u32 world_visibility = 0, world_lightgroup = 0;
     ConstantEmission world_emission;
     std::vector<ConstantEmission> material_emission;

@@ -109,9 +109,13 @@ void Renderer::find_constants() {
     scene_.has_world = input_.world.present;
     scene_.world_visibility = input_.world.visibility;
     scene_.world_lightgroup = input_.world.lightgroup;
-    if (input_.world.present && (view.world_program.flags & PROGRAM_CONSTANT_EMISSION)) {
+    const u32 world_flags = view.world_program.flags;
+    if (input_.world.present && (world_flags & PROGRAM_CONSTANT_EMISSION)) {
         scene_.world_emission = {true, evaluate_emission(view, view.world_program, points)};
+    } else if (!(world_flags & PROGRAM_EMISSION)) {
+        scene_.world_emission = {true, make_vec3(0.0f)};
     }
+    if (scene_.world_emission.constant && is_zero(scene_.world_emission.radiance)) scene_.has_world = false;
 }
 
 // The world without the disc of its sun, which has samples of its own.
@@ -183,6 +187,13 @@ void Renderer::build_lights() {
     const LightsView& lights = lights_.view();
     scene_.has_lights = lights.emitter_count > 0 || lights.sun_count > 0 || lights.world.present;
     scene_.has_visible_lamps = lights.box_count > 0;
+    scene_.can_meet_light = scene_.has_world || scene_.has_visible_lamps;
+    for (u32 sun = 0; sun < lights.sun_count; sun++) {
+        if (!lights.lamps[lights.suns[sun]].delta) scene_.can_meet_light = true;
+    }
+    for (u32 m = 0; m < scene_.view.material_count; m++) {
+        if (scene_.view.materials[m].program.flags & PROGRAM_EMISSION) scene_.can_meet_light = true;
+    }
 }
 
 bool Renderer::render(u32 first, u32 count) {
@@ -219,14 +230,8 @@ double Renderer::step_progress() const { return double(tiles_done_.load()) / dou
 
 RenderStats Renderer::stats() const {
     RenderStats stats = stats_;
-    for (const auto& batch : batches_) {
-        const BatchCounts c = batch->counts();
-        stats.counts.paths += c.paths;
-        stats.counts.rays += c.rays;
-        stats.counts.shadow_rays += c.shadow_rays;
-        stats.counts.surface_points += c.surface_points;
-        stats.counts.bad_samples += c.bad_samples;
-    }
+    stats.film_pixel_bytes = film_.pixel_bytes();
+    for (const auto& batch : batches_) stats.counts.add(batch->counts());
     return stats;
 }
 

@@ -41,6 +41,7 @@ struct RenderStats {
     std::string accel_name, accel_reason;
     double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0;
     u64 scene_bytes = 0;
+    u64 film_pixel_bytes = 0;  // what the film keeps of one pixel
 };
 
 class Renderer {

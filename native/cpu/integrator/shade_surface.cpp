@@ -178,6 +178,7 @@ void Batch::scatter(PathState& path, u32 k, int lane, Vec3 u) {
     bool see_through = s.transmitted && scene_.limits.film_transparent_glass && scene_.limits.film_transparent &&
                        s.roughness <= sqr(scene_.limits.film_transparent_roughness);
     count_bounce(path, scene_.limits, s, set_transmits(set), see_through);
+    if (looks_for_light_alone(path) && !scene_.can_meet_light) return;
     push_ray(ray_path_[k], offset_origin(scratch_->spawn[lane], ng, s.direction), s.direction);
 }
 
