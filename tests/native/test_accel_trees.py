@@ -188,6 +188,31 @@ MOST = {  # nodes, primitives of 2000 random rays at an icosphere of 20,480 tria
 }
 
 
+def beams_among_small_triangles() -> Mesh:
+    """Long thin triangles across many small ones: every box around a beam is nearly empty."""
+    rng = np.random.default_rng(5)
+    a, b = rng.uniform(-1, 1, (2, 60, 3))
+    beams = separate(np.stack([a, b, b + 0.01 * rng.normal(size=(60, 3))], 1))
+    small = soup(4000, 0.02)
+    return np.concatenate([small[0], beams[0]]), np.concatenate([small[1], beams[1] + len(small[0])]).astype(np.uint32)
+
+
+@every_kind
+def test_quality_high_cuts_beams_and_spares_their_tests(kind: Kind, quality: Quality) -> None:
+    mesh, rays = beams_among_small_triangles(), random_rays(2000)
+    plain, cut = Accel(*mesh, kind=kind, quality=quality), Accel(*mesh, kind=kind, quality="HIGH")
+    assert cut.count(rays)["primitives"] <= 0.5 * plain.count(rays)["primitives"]  # 0.20 to 0.33 measured
+    assert len(mesh[1]) < cut.stats["references"] <= 1.25 * len(mesh[1])  # 1.20 measured; 1.5 is the builder's bound
+    assert bits_differ(cut.closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays)) == 0
+
+
+@every_kind
+def test_quality_fast_costs_little_more_to_trace(kind: Kind, quality: Quality) -> None:
+    mesh, rays = icosphere(5), random_rays(2000)
+    plain, fast = (Accel(*mesh, kind=kind, quality=q).count(rays) for q in (quality, "FAST"))
+    assert fast["nodes"] <= 1.2 * plain["nodes"]
+
+
 @every_tree
 @pytest.mark.parametrize(
     "corners",
