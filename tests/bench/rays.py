@@ -165,9 +165,10 @@ def main() -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(rows, indent=1))
     if options.docs:
-        from rays_page import write_page
+        from rays_page import write_cuda_part, write_page
 
         write_page(rows, ratios(rows))
+        write_cuda_part()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""The measured half of docs/rays.md: tables and a plot from the race's rows, between two marks in the page."""
+"""The measured parts of docs/rays.md: tables and a plot from the race's rows, each between two marks in the page."""
 
 from __future__ import annotations
 
+import json
 import platform
 import subprocess
 from pathlib import Path
@@ -15,16 +16,43 @@ import matplotlib.pyplot as plt
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "rays.md"
-BEGIN, END = "<!-- race: begin -->", "<!-- race: end -->"
+CUDA_RECORD = ROOT / "tests" / "bench" / "records" / "rays-cuda.json"  # by `python -m luch bench rays --device cuda`
 
 
 def write_page(rows: list[dict[str, Any]], means: dict[str, dict[str, float]]) -> None:
-    """Replaces what stands between the marks. Raises ValueError if the page has none."""
-    text = PAGE.read_text(encoding="utf-8")
-    begin, end = text.index(BEGIN) + len(BEGIN), text.index(END)
-    body = "\n\n".join([_where(), *_tables(rows), _means(means), "![Mrays/s by structure](rays.png)"])
-    PAGE.write_text(text[:begin] + "\n" + body + "\n" + text[end:], encoding="utf-8")
+    """The CPU's race. Raises ValueError if the page has no marks for it."""
+    _replace("race", [_where(), *_tables(rows), _means(means), "![Mrays/s by structure](rays.png)"])
     _plot(rows)
+
+
+def write_cuda_part() -> None:
+    """The GPU's race, out of the record of its last run."""
+    record = json.loads(CUDA_RECORD.read_text(encoding="utf-8"))
+    machine, rows = record["machine"], record["rows"]
+    where = (f"Measured on one {machine['device']}, driver {machine['cuda_driver']}, {record['date']}, "
+             f"commit {record['commit']}, {record['rays']:,} rays a launch.")  # fmt: skip
+    tables = []
+    for mesh in dict.fromkeys(row["mesh"] for row in rows):
+        own = [row for row in rows if row["mesh"] == mesh]
+        lines = [f"**{mesh}**, {own[0]['triangles']:,} triangles", ""]
+        lines.append("| structure | " + " | ".join(f"{kind}, Mrays/s" for kind in KINDS)
+                     + " | registers | occupancy | nodes, tests of a diffuse ray | bytes/triangle |")  # fmt: skip
+        lines.append("|---|" + "---:|" * (len(KINDS) + 4))
+        for name in dict.fromkeys(row["structure"] for row in own):
+            by_rays = {row["rays"]: row for row in own if row["structure"] == name}
+            rates = [f"{by_rays[kind]['mrays_per_s']:,.4g}" if kind in by_rays else "" for kind in KINDS]
+            one = by_rays["diffuse"]
+            lines.append(f"| {name} | " + " | ".join(rates) + f" | {one['registers']} | {one['occupancy']:.2f} | "
+                         f"{one['nodes']:.1f}, {one['primitives']:.1f} | {one['bytes_per_triangle']:.0f} |")  # fmt: skip
+        tables.append("\n".join(lines))
+    _replace("cuda", [where, *tables])
+
+
+def _replace(name: str, parts: list[str]) -> None:
+    begin_mark, end_mark = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    text = PAGE.read_text(encoding="utf-8")
+    begin, end = text.index(begin_mark) + len(begin_mark), text.index(end_mark)
+    PAGE.write_text(text[:begin] + "\n" + "\n\n".join(parts) + "\n" + text[end:], encoding="utf-8")
 
 
 def _where() -> str:

@@ -13,7 +13,10 @@ namespace {
 constexpr float OUTER_CELLS_PER_PRIMITIVE = 0.12f, INNER_CELLS_PER_PRIMITIVE = 1.5f;
 constexpr u32 DENSE = 12;              // a cell of more primitives is divided
 constexpr u32 LARGE = 1u << 15;       // a cell of more is divided by all threads together
-constexpr double WORTHWHILE = 0.45;  // a grid's cells that hold any must hold fewer than this part of its primitives
+// A grid is worth its place if its cells hold fewer than this part of its primitives, on average: of a short list the
+// cells that hold any, of a long one all, as a teapot may fill one cell alone and be divided there.
+constexpr double WORTHWHILE = 0.45;
+constexpr u32 LONG_LIST = 64;
 constexpr u64 MOST_REFS_PER_PRIMITIVE = 12, REFS_OF_SMALL_GRIDS = 1u << 16;
 
 // A cell to be divided: its number in the built cells, what it is, and its primitives.
@@ -36,6 +39,14 @@ Box cell_box(const GridShape& grid, u32 code) {
     return {vec3_of(lo), vec3_of(hi)};
 }
 
+// What stands in the middle of a scene would stand at the corner of eight cells, and with their margins in all eight.
+Box off_centre(Box box, u32 bits) {
+    GridShape even = shape_grid(box, bits);
+    Vec3 shift = {even.width[0], even.width[1], even.width[2]};
+    box.hi += 0.3f * shift;
+    return box;
+}
+
 class HierarchicalGridStructure final : public StructureOf<HierarchicalGrid> {
  public:
     HierarchicalGridStructure(const StructureInput& input, ThreadPool& pool) : StructureOf(input.primitives) {
@@ -44,7 +55,7 @@ class HierarchicalGridStructure final : public StructureOf<HierarchicalGrid> {
         u64 most_refs = MOST_REFS_PER_PRIMITIVE * input.count + REFS_OF_SMALL_GRIDS;
         u32 bits =
             choose_grid_bits(primitives_, input.refs, input.count, box, OUTER_CELLS_PER_PRIMITIVE, most_refs / 2, pool);
-        GridCells outer = fill_grid(primitives_, input.refs, input.count, box, bits, pool);
+        GridCells outer = fill_grid(primitives_, input.refs, input.count, off_centre(box, bits), bits, pool);
         u64 spare = most_refs - std::min<u64>(outer.refs.size(), most_refs);
         std::vector<DenseCell> dense;
         add_grid(outer, &dense);
@@ -103,6 +114,7 @@ std::optional<GridCells> HierarchicalGridStructure::make_grid(const DenseCell& c
     GridCells grid = fill_grid(primitives_, cell.refs.data(), count, box, bits, pool);
     size_t used = 0;
     for (size_t c = 0; c + 1 < grid.first.size(); ++c) used += grid.first[c + 1] > grid.first[c];
+    if (count > LONG_LIST) used = grid.first.size() - 1;
     if (double(grid.refs.size()) > WORTHWHILE * double(count) * double(used)) return {};
     return grid;
 }
