@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import core
-from luch.accel import STRUCTURES, Accel
+from luch.accel import KINDS, STRUCTURES, Accel
 from numpy.typing import NDArray
 from support.accel_meshes import Mesh, icosphere, random_rays, rows, separate, soup
 
