@@ -13,10 +13,10 @@ from luch.effects import Effect, Effects, effects_of, summary
 from luch.effects.closures import LAYOUTS, input_places
 from luch.effects.picture import PASSES
 from luch.effects.programs import decode, read_program
-from luch.scene import Camera, Film, Image, Light, Material, Settings, World
+from luch.scene import Camera, Film, Image, Light, Material, Settings
 from luch.shader import ProgramBuilder, Value, Vector
 from luch.shader_code import OPS
-from support.effects import ONE, PLAIN, Inputs, closure, principled, program, scene
+from support.effects import ONE, PLAIN, Inputs, closure, principled, program, scene, sky
 
 HEADER = Path(__file__).resolve().parents[2] / "native/include/luch/shade/nodes/closures.h"
 
@@ -193,80 +193,6 @@ def test_holdouts_are_objects_or_materials() -> None:
     assert effects_of(subject)["holdout"].reason == "no object and no material is a holdout"
     subject.objects[0].holdout = True
     assert effects_of(subject)["holdout"].reason == 'object "Tree" is a holdout'
-
-
-LAMP_KINDS = {"POINT": "point lamps", "SPOT": "spot lamps", "SUN": "sun lamps", "AREA": "area lamps"}
-
-
-@pytest.mark.parametrize(("kind", "effect"), LAMP_KINDS.items())
-def test_lamps_are_told_by_type(kind: str, effect: str) -> None:
-    lamp = Light("Key", kind, radius=0.1, angle=0.01)
-    effects = effects_of(scene(principled, lights=[lamp]))
-    assert effects[effect].reason == '"Key"'
-    assert effects["soft shadows of lamps"].reason == 'lamp "Key" has a size'
-    assert effects["visible lamps"].on == (kind != "SUN")
-    others = set(LAMP_KINDS.values()) - {effect}
-    assert all(effects[other].reason == "the scene has none" for other in others)
-    lamp.power = 0.0
-    assert effects_of(scene(principled, lights=[lamp]))[effect].reason == '"Key" has no power'
-
-
-def test_point_like_lamps_are_neither_soft_nor_visible() -> None:
-    lamps = [Light("Bulb", "POINT"), Light("Sun", "SUN")]
-    effects = effects_of(scene(principled, lights=lamps))
-    assert effects["soft shadows of lamps"].reason == "no lamp has a size"
-    assert effects["visible lamps"].reason == "no lamp has a size"
-    assert effects["light tree"].reason == "there is one light: nothing to choose"
-
-
-def test_the_light_tree_counts_lamps_and_emissive_triangles() -> None:
-    def build(builder: ProgramBuilder) -> None:
-        builder.closure("CLOSURE_EMISSION", builder.vector(*ONE))
-
-    subject = scene(build, copies=3, lights=[Light("Bulb", "POINT")])
-    effects = effects_of(subject)
-    assert effects["emissive meshes"].cost == "3 triangles are lights to choose from"
-    assert effects["light tree"].reason == "chooses among 4 lights"
-    subject.materials[0].emission_sampling = "NONE"
-    effects = effects_of(subject)
-    assert effects["emissive meshes"].cost == "found by chance alone: not sampled"
-    assert not effects["light tree"].on
-    subject.settings.light_tree = False
-    assert effects_of(subject)["light tree"].reason.startswith("Light Tree is disabled")
-    assert effects_of(scene(principled))["emissive meshes"].reason == "no material emits light"
-
-
-def sky(builder: ProgramBuilder, name: str) -> None:
-    position = builder.op3("POINT_POSITION", (), (0, 0))
-    read = (*position, *([builder.constant(0.5)] * (OPS[name].inputs - 3)))[: OPS[name].inputs]
-    color = builder.op(name, read, (0,) * OPS[name].params)
-    builder.closure("CLOSURE_EMISSION", (color[0], color[-1], color[0]))
-
-
-@pytest.mark.parametrize(
-    ("operation", "effect", "reason"),
-    [
-        ("ENVIRONMENT", "environment image", 'world "Day" shows an image'),
-        ("SKY_ATMOSPHERE", "sky", 'world "Day" shows a Sky Texture'),
-        ("NOISE_3D", "procedural world", 'world "Day" shows a procedural texture'),
-    ],
-)
-def test_the_world_is_told_by_what_it_shows(operation: str, effect: str, reason: str) -> None:
-    effects = effects_of(scene(principled, world=World("Day", program(lambda b: sky(b, operation)))))
-    worlds = {"world colour", "environment image", "sky", "procedural world", "world light sampling"}
-    assert worlds & set(effects.names(on=True)) == {effect, "world light sampling"}
-    assert effects[effect].reason == reason
-
-
-def test_a_world_of_one_colour_needs_no_sampling() -> None:
-    def grey(strength: float) -> Effects:
-        build = program(lambda b: b.closure("CLOSURE_EMISSION", b.vector(strength, strength, strength)))
-        return effects_of(scene(principled, world=World("Day", build)))
-
-    assert grey(0.5)["world colour"].reason == 'world "Day" has one colour, 0.5 0.5 0.5'
-    assert grey(0.5)["world light sampling"].reason.endswith("no direction is better than another")
-    assert grey(0.0)["world colour"].reason == 'world "Day" is black'
-    assert effects_of(scene(principled))["sky"].reason == "the scene has no world"
 
 
 def test_depth_of_field_tells_an_f_stop_that_is_set_in_vain() -> None:

@@ -75,3 +75,11 @@ def scene(build: Callable[[ProgramBuilder], None] | None = None, *, copies: int 
     for name, value in fields.items():
         setattr(result, name, value)
     return result
+
+
+def sky(builder: ProgramBuilder, name: str) -> None:
+    """Emission of a colour that an operation gives."""
+    position = builder.op3("POINT_POSITION", (), (0, 0))
+    read = (*position, *([builder.constant(0.5)] * (OPS[name].inputs - 3)))[: OPS[name].inputs]
+    color = builder.op(name, read, (0,) * OPS[name].params)
+    builder.closure("CLOSURE_EMISSION", (color[0], color[-1], color[0]))
