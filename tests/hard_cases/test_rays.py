@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from luch import core
-from luch.accel import KINDS, Accel, Kind
+from luch.accel import KINDS, Accel, Device, Kind
 from support import closed_meshes
 from support.accel_meshes import F32, Mesh, aimed_rays, cube, icosphere, random_rays, rows, separate, soup
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
+every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 # Rays a case: what each kind traces in some tenths of a second on one core.
 COUNT: dict[str, int] = {"BVH": 200_000, "BVH2": 50_000, "BRUTE_FORCE": 50}
 OTHERS = 20_000
@@ -28,17 +29,19 @@ def assert_same_hits(accel: Accel, mesh: Mesh, rays: F32) -> int:
     return int((truth[1] >= 0).sum())
 
 
+@every_device
 @every_kind
 @pytest.mark.parametrize("name", closed_meshes.MESHES)
-def test_rows_1_to_8_no_ray_leaves_a_closed_mesh(name: str, kind: Kind) -> None:
-    accel = Accel(*closed_meshes.MESHES[name], kind=kind)
+def test_rows_1_to_8_no_ray_leaves_a_closed_mesh(name: str, kind: Kind, device: Device) -> None:
+    accel = Accel(*closed_meshes.MESHES[name], kind=kind, device=device)
     for rays in closed_meshes.RAYS:
         out, traced = closed_meshes.leaks(accel, name, rays, COUNT.get(kind, OTHERS) // len(closed_meshes.RAYS))
         assert out == 0, f"{rays}: {out} of {traced}"
 
 
+@every_device
 @every_kind
-def test_row_17_rays_off_a_face_do_not_hit_it_and_rays_into_the_cube_leave_it(kind: Kind) -> None:
+def test_row_17_rays_off_a_face_do_not_hit_it_and_rays_into_the_cube_leave_it(kind: Kind, device: Device) -> None:
     """From vertices, edges and faces of the cube, moved off as the integrator moves them."""
     mesh = cube(1, 1)
     rng = np.random.default_rng(17)
@@ -52,7 +55,7 @@ def test_row_17_rays_off_a_face_do_not_hit_it_and_rays_into_the_cube_leave_it(ki
     normal *= np.sign((normal * corners.mean(1)).sum(1, keepdims=True))
     direction = np.float32(rng.normal(size=(count, 3)))
     outward = direction * np.sign((direction * normal).sum(1, keepdims=True))
-    accel = Accel(*mesh, kind=kind)
+    accel = Accel(*mesh, kind=kind, device=device)
     for away in (outward, -outward):
         rays = core.spawn_rays(corners.reshape(-1, 9), np.float32(weights[:, 1:]), np.float32(away))
         _, prim, _, _ = accel.closest(rays)
@@ -61,29 +64,32 @@ def test_row_17_rays_off_a_face_do_not_hit_it_and_rays_into_the_cube_leave_it(ki
         assert ((prim[2::3] >= 0) == (away is not outward)).all()
 
 
+@every_device
 @every_kind
-def test_row_18_rays_that_start_on_split_planes_hit_as_by_brute_force(kind: Kind) -> None:
+def test_row_18_rays_that_start_on_split_planes_hit_as_by_brute_force(kind: Kind, device: Device) -> None:
     """A mesh of a grid's corners: planes and node bounds lie where its vertices do."""
     mesh = cube(6, 6)
     coordinates = np.unique(mesh[0])
     rng = np.random.default_rng(18)
     origin = rng.choice(coordinates, (4000, 3)) * rng.choice(np.float32([1, 1, 3]), (4000, 3))
     direction = rng.choice(np.float32([0.0, -0.0, 1.0, -1.0, 0.5]), (4000, 3))
-    assert assert_same_hits(Accel(*mesh, kind=kind), mesh, rows(origin, direction)) > 500
+    assert assert_same_hits(Accel(*mesh, kind=kind, device=device), mesh, rows(origin, direction)) > 500
 
 
+@every_device
 @every_kind
-def test_row_21_a_degenerate_triangle_that_fooled_others_is_not_hit(kind: Kind) -> None:
+def test_row_21_a_degenerate_triangle_that_fooled_others_is_not_hit(kind: Kind, device: Device) -> None:
     x, z = -1113.45459, -56.2431908
     line = separate(np.array([[(x, -79.049614, z), (x, -87.0922699, z), (x, -79.2090149, z)]]))
     ray = rows(np.array([[-1081.47925, 99.9999542, 87.7701111]]), np.array([[-32.1072998, -183.355865, -144.607635]]),
                t_max=0.9999)  # fmt: skip
-    assert not Accel(*line, kind=kind).any(ray).any()
+    assert not Accel(*line, kind=kind, device=device).any(ray).any()
 
 
+@every_device
 @every_kind
-def test_row_22_rays_that_are_none_miss(kind: Kind) -> None:
-    accel = Accel(*icosphere(2), kind=kind)
+def test_row_22_rays_that_are_none_miss(kind: Kind, device: Device) -> None:
+    accel = Accel(*icosphere(2), kind=kind, device=device)
     good = random_rays(1000, scale=0.2)
     for place in range(8):
         for value in (np.nan, np.inf, -np.inf):
@@ -101,8 +107,9 @@ def test_row_22_rays_that_are_none_miss(kind: Kind) -> None:
         assert (prim == -1).all() and (t == np.inf).all()
 
 
+@every_device
 @every_kind
-def test_rows_23_to_26_bad_triangles_change_no_hit_on_good_ones(kind: Kind) -> None:
+def test_rows_23_to_26_bad_triangles_change_no_hit_on_good_ones(kind: Kind, device: Device) -> None:
     ball = icosphere(3)
     rng = np.random.default_rng(23)
     point = np.repeat(rng.normal(size=(50, 1, 3)), 3, axis=1)
@@ -116,45 +123,53 @@ def test_rows_23_to_26_bad_triangles_change_no_hit_on_good_ones(kind: Kind) -> N
         np.concatenate([ball[1], np.arange(len(extra), dtype=np.uint32).reshape(-1, 3) + count, [[0, 0, 1]]]),
     )
     rays = np.concatenate([random_rays(2000), aimed_rays(ball, 2000)])
-    alone, among = (Accel(*each, kind=kind).closest(rays) for each in (ball, (mesh[0], mesh[1].astype(np.uint32))))
+    alone, among = (
+        Accel(*each, kind=kind, device=device).closest(rays) for each in (ball, (mesh[0], mesh[1].astype(np.uint32)))
+    )
     for a, b in zip(alone, among, strict=True):
         assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
 
 
+@every_device
 @every_kind
-def test_row_25_huge_triangles_are_hit_without_overflow(kind: Kind) -> None:
+def test_row_25_huge_triangles_are_hit_without_overflow(kind: Kind, device: Device) -> None:
     mesh = separate(np.array([[(-1e30, -1e30, 1e30), (1e30, -1e30, 1e30), (0, 1e30, 1e30)]]))
-    t, prim, _, _ = Accel(*mesh, kind=kind).closest(rows(np.zeros((1, 3)), np.array([[0, 0, 1.0]])))
+    t, prim, _, _ = Accel(*mesh, kind=kind, device=device).closest(rows(np.zeros((1, 3)), np.array([[0, 0, 1.0]])))
     assert (prim[0], t[0]) == (0, np.float32(1e30))
 
 
+@every_device
 @every_kind
 @pytest.mark.parametrize("count", [1, 10_000])
-def test_rows_31_and_32_identical_and_coplanar_triangles_cost_memory_in_proportion(kind: Kind, count: int) -> None:
+def test_rows_31_and_32_identical_and_coplanar_triangles_cost_memory_in_proportion(
+    kind: Kind, count: int, device: Device
+) -> None:
     one = separate(np.array([[(-1, -1, 0), (1, -1, 0), (0, 1, 0)]]))
     same = (np.tile(one[0], (count, 1)), np.arange(3 * count, dtype=np.uint32).reshape(-1, 3))
     rng = np.random.default_rng(31)
     plane = separate(np.concatenate([rng.uniform(-1, 1, (count, 3, 2)), np.zeros((count, 3, 1))], axis=2))
     ray = rows(np.array([[0.1, 0.1, 1.0]]), np.array([[0, 0, -1.0]]))
     for mesh in (same, plane):
-        accel = Accel(*mesh, kind=kind)
+        accel = Accel(*mesh, kind=kind, device=device)
         # 100 bytes a triangle are what these structures take on soups; 64 kB are a grid's own cells.
         assert accel.stats["bytes"] <= 65536 + 400 * count
         assert_same_hits(accel, mesh, ray)
-    assert Accel(*same, kind=kind).closest(ray)[1][0] == 0
+    assert Accel(*same, kind=kind, device=device).closest(ray)[1][0] == 0
 
 
+@every_device
 @every_kind
-def test_row_33_ever_smaller_triangles_make_no_endless_tree(kind: Kind) -> None:
+def test_row_33_ever_smaller_triangles_make_no_endless_tree(kind: Kind, device: Device) -> None:
     size = 0.9999 ** np.arange(20_000)[:, None, None]
     mesh = separate(size * (np.array([1.0, 0.3, -0.2]) + 0.01 * np.random.default_rng(33).normal(size=(20_000, 3, 3))))
-    accel = Accel(*mesh, kind=kind)
+    accel = Accel(*mesh, kind=kind, device=device)
     assert accel.stats.get("depth", 0) <= 96
     assert assert_same_hits(accel, mesh, aimed_rays(mesh, 60)) > 20
 
 
+@every_device
 @pytest.mark.parametrize("kind", ["BVH2", "BVH2_STACKLESS", "CWBVH", "KD_TREE", "HIERARCHICAL_GRID"])
-def test_row_34_a_stadium_around_a_teapot_costs_its_rays_little(kind: Kind) -> None:
+def test_row_34_a_stadium_around_a_teapot_costs_its_rays_little(kind: Kind, device: Device) -> None:
     ball = closed_meshes.moved(icosphere(5), 0.01)
     stadium = soup(5000, 0.01, seed=34)
     around = (np.concatenate([ball[0], stadium[0] * np.float32(500)]),
@@ -162,6 +177,6 @@ def test_row_34_a_stadium_around_a_teapot_costs_its_rays_little(kind: Kind) -> N
     rng = np.random.default_rng(34)
     eye = np.float32([0.03, 0, 0])
     rays = rows(np.tile(eye, (2000, 1)), closed_meshes.targets(ball, rng, 2000, 3) - eye)
-    alone, among = (Accel(*mesh, kind=kind).count(rays) for mesh in (ball, around))
+    alone, among = (Accel(*mesh, kind=kind, device=device).count(rays) for mesh in (ball, around))
     work = [counts["nodes"] + counts["primitives"] for counts in (alone, among)]
     assert work[1] <= 3 * work[0]
