@@ -289,3 +289,23 @@ def test_an_aov_that_the_film_does_not_keep_is_dead() -> None:
 
     assert not effects_of(scene(build))["magic"].on
     assert effects_of(scene(build, film=Film(aovs=[("Wear", "COLOR")])))["magic"].on
+
+
+def test_what_lies_beside_the_common_cases_is_told_too() -> None:
+    subject = scene(principled, camera=Camera(kind="EQUIRECTANGULAR"), film=Film(transparent=True))
+    subject.film.transparent_glass = True
+    subject.objects[0].shadow_catcher = True
+    subject.unsupported = {"light linking": ['Object "Tree" uses light linking.'], "ray portals": ["A portal."]}
+    subject.lights = [Light("Lantern", "POINT", program=program(lambda b: sky(b, "IES")))]
+    effects = effects_of(subject)
+    assert effects["panorama"].on
+    assert effects["transparent glass"].reason == "nothing transmits light"
+    assert (
+        effects["shadow catcher"].state == effects["light linking"].state == effects["ray portals"].state == "not yet"
+    )
+    assert effects["lamp nodes"].reason == 'lamp "Lantern" has nodes'
+    assert effects["IES profiles"].reason == 'lamp "Lantern" reads one'
+    plain = effects_of(scene(principled, lights=[Light("Lantern", "POINT")]))
+    assert plain["panorama"].reason == "the camera is perspective"
+    assert plain["transparent glass"].reason == "Film > Transparent Glass is disabled"
+    assert {plain[name].state for name in ("shadow catcher", "light linking", "lamp nodes", "IES profiles")} == {"off"}
