@@ -20,6 +20,10 @@ AHEAD = NATIVE / "luch" / "kernels"
 DEFAULT = "WATERTIGHT"
 OLDEST = 75  # PTX for it runs on everything newer
 FUSES_BOXES = "CWBVH"  # the one that rounds box distances once, on purpose (accel/wide_ray.h)
+WALKS_IN_DOUBLE = (
+    "GRID",
+    "HIERARCHICAL_GRID",
+)  # where a walk is in doubt, its cells are found in double (accel/grid.h)
 Unit = Tuple[str, str]  # module, precision
 
 
@@ -32,7 +36,9 @@ def table() -> Dict[str, Any]:
 def units() -> List[Unit]:
     """Every module in every precision."""
     precisions = [name for name in table()["flags"] if name != "all"]
-    return [(module, precision) for module in table()["modules"] for precision in precisions]
+    return [(module, precision) for module in table()["modules"] for precision in precisions] + [
+        (builder, DEFAULT) for builder in table()["builders"]
+    ]
 
 
 def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
@@ -52,7 +58,7 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
         ptx = ptx_of(unit)
         flags = table()["flags"]["all"] + table()["flags"][precision]
         folders = ["-I", str(NATIVE / "include"), "-I", str(NATIVE / "cuda")]
-        source = NATIVE / "cuda" / str(table()["modules"][module])
+        source = NATIVE / "cuda" / {**table()["modules"], **table()["builders"]}[module]
         errors = _errors([found, "-ptx", f"-arch=compute_{OLDEST}", *flags, *folders, str(source), "-o", str(ptx)])
         known = table()["architectures"]
         chosen = known if everywhere or precision == DEFAULT else [known[0], known[-1]]
@@ -88,7 +94,7 @@ def faults(unit: Unit, ptx: str) -> List[str]:
     """What a unit's instructions must not hold: slow doubles where speed is asked, sums fused behind our back."""
     module, precision = unit
     wrong = []
-    if precision == "FAST" and re.search(r"\.f64\b", ptx):
+    if precision == "FAST" and module not in WALKS_IN_DOUBLE and re.search(r"\.f64\b", ptx):
         wrong.append("instructions in double precision (.f64), which FAST must not have")
     if precision != "FAST" and re.search(r"\bfma\.rn\.f64\b", ptx):
         wrong.append("fma.rn.f64: an edge function is contracted")
@@ -116,12 +122,15 @@ def place_kernels() -> None:
     """For `build --cuda`: the machine code under the names that luch.cuda looks for, in native/luch/kernels."""
     if compile_kernels(everywhere=True) is None:
         raise BuildFailure("build --cuda needs nvcc on PATH; without it kernels are compiled on first use by NVRTC")
-    code = ("import json; from luch.cuda.compiler import ahead_name, table; print(json.dumps([[m, p, a, ahead_name(m, p, a)]"
-            " for m in table()['modules'] for p in table()['flags'] if p != 'all' for a in table()['architectures']]))")  # fmt: skip
-    names = output([str(VENV_PYTHON), "-c", code])
+    code = (
+        "import json, sys; from luch.cuda.compiler import ahead_name; "
+        "print(json.dumps([ahead_name(*unit) for unit in json.loads(sys.argv[1])]))"
+    )
+    wanted = [(*unit, architecture) for unit in units() for architecture in table()["architectures"]]
+    names = output([str(VENV_PYTHON), "-c", code, json.dumps(wanted)])
     if names is None:
         raise BuildFailure("luch.cuda could not be imported from native/")
     shutil.rmtree(AHEAD, ignore_errors=True)
     AHEAD.mkdir()
-    for module, precision, architecture, name in json.loads(names):
+    for (module, precision, architecture), name in zip(wanted, json.loads(names)):
         shutil.copyfile(FOLDER / f"{module}-{precision}-sm_{architecture}.cubin", AHEAD / name)

@@ -39,8 +39,8 @@ class Accel:
     turn: the oracle, and for tiny meshes. precision: "FAST" (single precision), "WATERTIGHT" (no ray slips between
     two triangles that share an edge) or "DOUBLE". quality of the build: "FAST", "NORMAL" or "HIGH".
     may_be_transparent: (T + S,) bool, for `blocked`. threads: 0 is all processors. device: "CUDA" takes rays from
-    NumPy or from the GPU (CuPy) and answers in kind; "BVH" is there the compressed eight-wide tree ("CWBVH"); the
-    structure is built on the CPU and uploaded. Primitives with a number that is not finite, with an index outside the
+    NumPy or from the GPU (CuPy) and answers in kind; "BVH" is there the compressed eight-wide tree ("CWBVH"); with
+    quality "FAST" that one is built on the GPU, all else on the CPU and uploaded. Primitives with a number that is not finite, with an index outside the
     mesh or of no area or no radius are dropped and counted in `stats`. Raises ValueError on wrong shapes or types,
     luch.cuda.DeviceError where CUDA cannot be used.
     """
@@ -88,8 +88,11 @@ class Accel:
 
             kind = "CWBVH" if kind == "BVH" else kind
             number, detail = STRUCTURES.index(kind), QUALITIES.index(quality)
-            host = core.ArrayStructure(points, corners, balls, flags, number, detail, threads)
-            self._structure = DeviceStructure(host, kind, points, corners, balls, flags)
+            if kind == "CWBVH" and quality == "FAST" and not len(balls):
+                self._structure = DeviceStructure.built(points, corners, flags)
+            if self._structure is None:
+                host = core.ArrayStructure(points, corners, balls, flags, number, detail, threads)
+                self._structure = DeviceStructure.uploaded(host, kind, points, corners, balls, flags)
             self._precision = precision
         elif kind == "BVH":
             mesh = np.array([[0, len(points), 0, len(corners)]], np.uint32)

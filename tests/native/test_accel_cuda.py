@@ -38,7 +38,7 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         patch.setattr(compiler, "AHEAD", folder)
 
         def compiled(module: str, precision: str, architecture: int) -> bytes:
-            source = compiler.source_folders()[1] / compiler.table()["modules"][module]
+            source = compiler.source_of(module)
             return cuda_on_cpu.compile_module(source, precision, folder, list(compiler.source_folders())).encode()
 
         patch.setattr(compiler, "compiled", compiled)
@@ -146,6 +146,31 @@ def test_hits_are_bit_equal_at_any_scale(place: str, kind: Any, scale: float) ->
     mesh = ((points * np.float64(scale)).astype(np.float32), triangles)
     rays = aimed_rays(mesh, 10_000 if place == GPU else 100)
     check_equal(Accel(*mesh, kind=kind, device="CUDA").closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays))
+
+
+BUILT = ("soup", "slivers", "identical", "duplicates", "coplanar", "size 2^-i", "sphere")
+
+
+@pytest.mark.parametrize("name", BUILT)
+def test_tree_built_on_the_device_gives_brute_force_hits(place: str, name: str) -> None:
+    mesh = HARD_MESHES[name]
+    rays = some_rays(mesh, place)
+    ours = Accel(*mesh, kind="CWBVH", quality="FAST", device="CUDA")
+    assert ours.stats["built_on_device"]
+    assert ours.stats["references"] == ours.stats["primitives"] > 100
+    check_equal(ours.closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays))
+    good = Accel(*mesh, kind="CWBVH", device="CUDA")
+    assert ours.count(rays)["boxes"] <= 2.5 * good.count(rays)["boxes"]
+
+
+def test_builder_on_the_device_drops_what_the_cpu_drops(place: str) -> None:
+    points, triangles = soup(200)
+    points[5], triangles[7, 1] = np.nan, 1_000_000
+    ours = Accel(points, triangles, kind="CWBVH", quality="FAST", device="CUDA")
+    cpu = Accel(points, triangles, kind="CWBVH")
+    assert (ours.stats["primitives"], ours.stats["dropped"]) == (cpu.stats["primitives"], cpu.stats["dropped"])
+    rays = some_rays(soup(200), place)
+    check_equal(ours.closest(rays), cpu.closest(rays))
 
 
 @pytest.mark.cuda

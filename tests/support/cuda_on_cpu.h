@@ -160,6 +160,17 @@ template <class T>
 T __ldg(const T* p) {
     return *p;
 }
+template <class T>
+T __ldcg(const T* p) {
+    return *p;
+}
+template <class T>
+T atomicExch(T* p, T x) {
+    T old = *p;
+    *p = x;
+    return old;
+}
+inline void __threadfence() {}
 template <class T, class U>
 T atomicAdd(T* p, U x) {
     T old = *p;

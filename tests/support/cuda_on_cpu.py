@@ -53,13 +53,19 @@ class _Event:
 
 def compile_module(source: Path, precision: str, folder: Path, include: list[Path]) -> str:
     """The kernels of one .cu file as a library, its path: run_NAME(parameters, grid, block) for each."""
-    names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", _reached(source, include[1]))))
-    assert names
+    text = _reached(source, include[1])
+    names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", text)))
+    builds = re.findall(r"LUCH_BUILD_KERNEL\((\w+)\)\(const luch::BuildTask", text)
+    assert names or builds
     runs = "".join(
         f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
-        f"    cuda_on_cpu::launch(grid, block, [p] {{ {name}(*(LUCH_VIEW*)p[0], *(luch::Primitives*)p[1], "
+        f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}(*(LUCH_VIEW*)p[0], *(luch::Primitives*)p[1], "
         "*(luch::RayBatch*)p[2]); });\n}\n"
         for name in names
+    ) + "".join(
+        f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
+        f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}(*(luch::BuildTask*)p[0]); }});\n}}\n"
+        for name in builds
     )
     file = folder / f"{source.stem}_{precision}.cpp"
     file.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n#include "{source}"\n{runs}')
@@ -72,7 +78,7 @@ def compile_module(source: Path, precision: str, folder: Path, include: list[Pat
 def _reached(source: Path, kernels: Path) -> str:
     """The source with the kernel files that it includes."""
     text = source.read_text(encoding="utf-8")
-    included = re.findall(r'#include "(rays/\w+\.cuh)"', text)
+    included = re.findall(r'#include "(\w+/\w+\.cuh)"', text)
     return text + "".join(_reached(kernels / name, kernels) for name in included)
 
 
@@ -115,5 +121,5 @@ def fake_cupy() -> Any:
     return types.SimpleNamespace(
         __version__="fibers", cuda=cuda, asarray=_array, ascontiguousarray=_array,
         asnumpy=np.array, empty=lambda *a: np.full(*a[:1], 77, *a[1:]).view(Array),
-        zeros=lambda *a: np.zeros(*a).view(Array),
+        zeros=lambda *a: np.zeros(*a).view(Array), flatnonzero=lambda a: np.flatnonzero(a).view(Array), argsort=lambda a: np.argsort(a).view(Array),
     )  # fmt: skip

@@ -49,6 +49,12 @@ def _sources_hash() -> str:
     return digest.hexdigest()
 
 
+def source_of(module: str) -> Path:
+    """The .cu file of a module or builder of kernels.json."""
+    name: str = (table()["modules"] | table()["builders"])[module]
+    return source_folders()[1] / name
+
+
 def flags(precision: str) -> list[str]:
     """What decides the numbers: of the table, the same for NVRTC and nvcc."""
     return [*table()["flags"]["all"], *table()["flags"][precision]]
@@ -56,7 +62,7 @@ def flags(precision: str) -> list[str]:
 
 def ahead_name(module: str, precision: str, architecture: int) -> str:
     """File name under which a kernel compiled ahead of time is looked for."""
-    parts = [_sources_hash(), table()["modules"][module], *flags(precision), str(architecture)]
+    parts = [_sources_hash(), source_of(module).name, *flags(precision), str(architecture)]
     return (
         f"{module}-{precision}-sm_{architecture}-{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:16]}.cubin"
     )
@@ -92,7 +98,7 @@ def _compile(nvrtc: Any, module: str, precision: str, architecture: int) -> byte
     known = [a for a in nvrtc.getSupportedArchs() if a <= architecture]
     target = f"sm_{architecture}" if architecture in known else f"compute_{max(known)}"  # the driver compiles PTX on
     options = [f"-arch={target}", f"-I{include}", f"-I{kernels}", *flags(precision)]
-    source = kernels / table()["modules"][module]
+    source = source_of(module)
     program = nvrtc.createProgram(source.read_text(encoding="utf-8"), str(source), (), ())
     try:
         nvrtc.compileProgram(program, tuple(options))

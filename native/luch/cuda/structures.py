@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from luch.cuda.builder import build_cwbvh
 from luch.cuda.compiler import load
 from luch.cuda.device import Kernel, cupy, is_device_array
 
@@ -18,24 +19,37 @@ COUNTERS = ("nodes", "boxes", "primitives", "bytes")
 
 
 class DeviceStructure:
-    """A structure's view and arrays on the current device.
+    """A structure's view and arrays on the current device. kind: a module of kernels.json."""
 
-    host: core.ArrayStructure of that kind. positions (V, 3), triangles (T, 3), spheres (S, 4), flags: what it was
-    built from. kind: a module of kernels.json.
-    """
-
-    def __init__(self, host: Any, kind: str, positions: Any, triangles: Any, spheres: Any, flags: Any) -> None:
+    def __init__(self, kind: str, view: bytes, arrays: list[Any], sources: list[Any], stats: dict[str, float]) -> None:
+        """view: the struct's bytes, pointing at arrays. sources: corners (T, 3, 3), spheres (S, 4), flags."""
         self.kind = kind
-        self._view, self._arrays = upload_view(*host.device_arrays())
+        self._view, self._arrays, self._sources, self._stats = view, arrays, sources, stats
+        pointers = [a.data.ptr if a.size else 0 for a in sources]
+        self._primitives = struct.pack("<QQQII", *pointers, len(sources[0]), len(sources[1]))
+
+    @classmethod
+    def uploaded(
+        cls, host: Any, kind: str, positions: Any, triangles: Any, spheres: Any, flags: Any
+    ) -> DeviceStructure:
+        """Built on the CPU: host is core.ArrayStructure of that kind, the rest what it was built from."""
+        view, arrays = upload_view(*host.device_arrays())
         if kind in OWN_PRIMITIVES:
             triangles, spheres, flags = triangles[:0], spheres[:0], flags[:0]
         inside = np.minimum(triangles, max(len(positions) - 1, 0))  # those outside were dropped by the builder
         corners = positions[inside] if len(positions) else np.zeros((len(triangles), 3, 3), np.float32)
-        sources = [np.ascontiguousarray(a) for a in (corners, spheres, flags)]
-        self._sources = [cupy().asarray(a) for a in sources]
-        pointers = [a.data.ptr if a.size else 0 for a in self._sources]
-        self._primitives = struct.pack("<QQQII", *pointers, len(triangles), len(spheres))
-        self._host_stats = host.stats()
+        sources = [cupy().asarray(np.ascontiguousarray(a)) for a in (corners, spheres, flags)]
+        return cls(kind, view, arrays, sources, host.stats() | {"built_on_device": False})
+
+    @classmethod
+    def built(cls, positions: Any, triangles: Any, flags: Any) -> DeviceStructure | None:
+        """The compressed wide tree of triangles, built on the GPU; None where build_cwbvh leaves it to the CPU."""
+        made = build_cwbvh(positions, triangles, flags)
+        if made is None:
+            return None
+        view, arrays, stats = made
+        nothing = [cupy().empty((0, 9), np.float32), cupy().empty((0, 4), np.float32), cupy().empty(0, np.uint8)]
+        return cls("CWBVH", view, arrays, nothing, stats | {"built_on_device": True})
 
     def closest(self, rays: Any, precision: str, counted: bool, kernel: str = "closest") -> tuple[Any, ...]:
         """rays: (N, 8) float32, NumPy or CuPy. t, prim, u, v of the same library, and a dictionary of counts."""
@@ -85,8 +99,7 @@ class DeviceStructure:
 
     def stats(self) -> dict[str, float]:
         """As the builder counted."""
-        result: dict[str, float] = self._host_stats
-        return result
+        return self._stats
 
 
 def _like(given: Any, *results: Any) -> tuple[Any, ...]:
