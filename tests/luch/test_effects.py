@@ -13,10 +13,10 @@ from luch.effects import Effect, Effects, effects_of, summary
 from luch.effects.closures import LAYOUTS, input_places
 from luch.effects.picture import PASSES
 from luch.effects.programs import decode, read_program
-from luch.scene import Camera, Film, Image, Material, Settings
+from luch.scene import Camera, Film, Image, Light, Material, Settings
 from luch.shader import ProgramBuilder, Value, Vector
 from luch.shader_code import OPS
-from support.effects import ONE, PLAIN, Inputs, closure, principled, program, scene
+from support.effects import ONE, PLAIN, Inputs, closure, principled, program, scene, sky
 
 HEADER = Path(__file__).resolve().parents[2] / "native/include/luch/shade/nodes/closures.h"
 
