@@ -172,7 +172,8 @@ LeafPrimitive leaf_primitive(const Primitives& all, u32 ref) {
 class CompressedTree final : public StructureOf<Cwbvh> {
  public:
     CompressedTree(const StructureInput& input, ThreadPool& pool) : StructureOf(input.primitives) {
-        Tree2 tree = build_tree2(input, 1, pool);
+        auto cost = [&](const Tree2& t) { return Collapse(t, COSTS, pool).cost(); };
+        Tree2 tree = build_tree2(input, 1, pool, cost);
         view_.root = tree.root;
         if (tree.nodes.empty()) return;
         WideTree wide = make_nodes(tree, Collapse(tree, COSTS, pool));

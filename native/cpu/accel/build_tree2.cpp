@@ -20,10 +20,11 @@ double expected_cost(const Tree2& tree) {
 }
 
 // Cutting primitives pays at once where it is done, but may cost more below: keep what is better in the end.
-Tree2 build_best(const StructureInput& input, HugeArray<PrimBox> boxes, u32 max_leaf, ThreadPool& pool) {
+Tree2 build_best(const StructureInput& input, HugeArray<PrimBox> boxes, u32 max_leaf, ThreadPool& pool,
+                 const TreeCost& cost) {
     Tree2 cut = build_tree2_spatial(input, boxes, max_leaf, pool);
     Tree2 sorted = build_tree2_binned(std::move(boxes), input.count, max_leaf, HALVING_LEVEL, pool);
-    return expected_cost(cut) < expected_cost(sorted) ? std::move(cut) : std::move(sorted);
+    return cost(cut) < cost(sorted) ? std::move(cut) : std::move(sorted);
 }
 
 }  // namespace
@@ -67,11 +68,12 @@ void append_subtrees(Tree2& tree, const std::vector<Subtree>& subtrees, ThreadPo
     tree.root = {{root.lo[0], root.lo[1], root.lo[2]}, {root.hi[0], root.hi[1], root.hi[2]}};
 }
 
-Tree2 build_tree2(const StructureInput& input, u32 max_leaf, ThreadPool& pool) {
+Tree2 build_tree2(const StructureInput& input, u32 max_leaf, ThreadPool& pool, const TreeCost& cost) {
     if (input.count == 0) return {};
     HugeArray<PrimBox> boxes = gather_prim_boxes(input, pool);
     if (input.quality == BuildQuality::FAST) return build_tree2_clusters(std::move(boxes), input.count, pool);
-    if (input.quality == BuildQuality::HIGH) return build_best(input, std::move(boxes), max_leaf, pool);
+    if (input.quality == BuildQuality::HIGH)
+        return build_best(input, std::move(boxes), max_leaf, pool, cost ? cost : expected_cost);
     return build_tree2_binned(std::move(boxes), input.count, max_leaf, HALVING_LEVEL, pool);
 }
 

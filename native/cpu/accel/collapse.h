@@ -21,6 +21,8 @@ class Collapse {
     };
     Collapse(const Tree2& tree, const Costs& costs, ThreadPool& pool);
 
+    // Expected work of a ray that meets the root, times the root's area.
+    double cost() const { return double(best_[0].cost[0]) / double(scale_) / double(scale_); }
     // The children of the wide node that a binary node becomes; the root may be a leaf, then it is its own child.
     int children(u32 node, WideChild* out) const;
     // The refs below a node, each once, ascending; at most max_leaf.

@@ -1,6 +1,7 @@
 // The builders of binary trees. What comes out is plain: the nodes of bvh2.h and the refs of their leaves. Other
 // structures are made from it: depth first without a stack, or collapsed to wide nodes.
 #pragma once
+#include <functional>
 #include <vector>
 
 #include "cpu/accel/build_bvh8.h"
@@ -16,8 +17,10 @@ struct Tree2 {
     u32 depth = 0;                // levels below the root, at most BVH2_MAX_DEPTH
 };
 
-// A leaf holds at most max_leaf refs, and fewer where splitting is cheaper.
-Tree2 build_tree2(const StructureInput& input, u32 max_leaf, ThreadPool& pool);
+// A leaf holds at most max_leaf refs, and fewer where splitting is cheaper. cost: what a tree is worth to the caller,
+// where a quality has two to choose from; by itself, the boxes and primitives that a ray is expected to meet.
+using TreeCost = std::function<double(const Tree2&)>;
+Tree2 build_tree2(const StructureInput& input, u32 max_leaf, ThreadPool& pool, const TreeCost& cost = {});
 
 // Its parts, one a quality. count > 0.
 //
