@@ -94,8 +94,14 @@ void sort_keys(std::vector<Keyed>& keys, ThreadPool& pool) {
 
 class Clusters {
  public:
-    Clusters(HugeArray<PrimBox> sorted, size_t count, ThreadPool& pool)
-        : now_(std::move(sorted)), next_(count), pairs_(2 * count), nearest_(count), count_(count), pool_(pool) {}
+    // scratch: as large, its contents do not matter.
+    Clusters(HugeArray<PrimBox> sorted, HugeArray<PrimBox> scratch, size_t count, ThreadPool& pool)
+        : now_(std::move(sorted)),
+          next_(std::move(scratch)),
+          nodes_(2 * count + 2),
+          nearest_(count),
+          count_(count),
+          pool_(pool) {}
 
     void merge_all() {
         size_t enough = std::max<size_t>(count_ / SHRINK, FEW);
@@ -107,9 +113,12 @@ class Clusters {
         }
     }
     size_t count() const { return count_; }
-    size_t pair_nodes() const { return pair_nodes_; }
     const PrimBox& operator[](size_t i) const { return now_[i]; }
-    const Bvh2Node* pairs() const { return pairs_.data(); }
+    // The pairs of what has merged, from place 2; with room for the top's nodes behind them.
+    std::vector<Bvh2Node> take_nodes() {
+        nodes_.resize(node_count_);
+        return std::move(nodes_);
+    }
 
  private:
     // Of equal areas the pair of least i ^ j: the same order from both sides, and identical boxes pair up at once.
@@ -152,7 +161,7 @@ class Clusters {
             first_pair[c + 1] += first_pair[c];
         }
         pool_.parallel_for(count_, CHUNK, [&](size_t begin, size_t end, unsigned) {
-            size_t to = first[begin / CHUNK], pair = pair_nodes_ + 2 * first_pair[begin / CHUNK];
+            size_t to = first[begin / CHUNK], pair = node_count_ + 2 * first_pair[begin / CHUNK];
             for (size_t i = begin; i < end; ++i) {
                 if (!mutual(i)) {
                     next_[to++] = now_[i];
@@ -162,14 +171,14 @@ class Clusters {
                 }
             }
         });
-        pair_nodes_ += 2 * first_pair[chunks];
+        node_count_ += 2 * first_pair[chunks];
         count_ = first[chunks];
         std::swap(now_, next_);
     }
 
     PrimBox join(const PrimBox& a, const PrimBox& b, size_t pair) {
-        pairs_[pair] = node_of(a);
-        pairs_[pair + 1] = node_of(b);
+        nodes_[pair] = node_of(a);
+        nodes_[pair + 1] = node_of(b);
         PrimBox out;
         store(&out, max_of(box_of(a), box_of(b)));
         out.id = u32(pair);
@@ -181,43 +190,41 @@ class Clusters {
     }
 
     HugeArray<PrimBox> now_, next_;
-    HugeArray<Bvh2Node> pairs_;
-    size_t pair_nodes_ = 0;
+    std::vector<Bvh2Node> nodes_;
+    size_t node_count_ = 2;
     std::vector<u32> nearest_;
     size_t count_;
     ThreadPool& pool_;
 };
 
-// The top's leaves become the clusters they stand for; the pairs of these follow the top's nodes.
-Tree2 attach(Tree2 tree, const Clusters& clusters, std::vector<u32> refs, ThreadPool& pool) {
+// The top's leaves become the clusters they stand for; its nodes follow theirs, but for the root.
+Tree2 attach(const Tree2& top, Clusters& clusters, std::vector<u32> refs) {
     struct Open {
-        u32 node, level;
+        u32 node, to, level;
     };
-    u32 offset = u32(tree.nodes.size());
-    std::vector<Open> open = {{0, 0}};
-    while (!open.empty()) {
-        auto [at, level] = open.back();
-        open.pop_back();
-        Bvh2Node& node = tree.nodes[at];
-        if (node.count == 0) {
-            open.push_back({node.child + 1, level + 1});
-            open.push_back({node.child, level + 1});
-            continue;
-        }
-        const PrimBox& c = clusters[tree.refs[node.child]];
-        tree.depth = std::max(tree.depth, level + height(c));
-        node.count = is_leaf(c);
-        node.child = is_leaf(c) ? c.id : c.id + offset;
-    }
-    tree.nodes.resize(offset + clusters.pair_nodes());
-    pool.parallel_for(clusters.pair_nodes(), CHUNK, [&](size_t begin, size_t end, unsigned) {
-        for (size_t i = begin; i < end; ++i) {
-            Bvh2Node node = clusters.pairs()[i];
-            if (node.count == 0) node.child += offset;
-            tree.nodes[offset + i] = node;
-        }
-    });
+    Tree2 tree;
+    tree.nodes = clusters.take_nodes();
     tree.refs = std::move(refs);
+    tree.root = top.root;
+    u32 offset = u32(tree.nodes.size()) - 2;
+    tree.nodes.resize(offset + top.nodes.size());
+    std::vector<Open> open = {{0, 0, 0}};
+    while (!open.empty()) {
+        auto [at, to, level] = open.back();
+        open.pop_back();
+        Bvh2Node node = top.nodes[at];
+        if (node.count == 0) {
+            open.push_back({node.child + 1, node.child + 1 + offset, level + 1});
+            open.push_back({node.child, node.child + offset, level + 1});
+            node.child += offset;
+        } else {
+            const PrimBox& c = clusters[top.refs[node.child]];
+            tree.depth = std::max(tree.depth, level + height(c));
+            node.count = is_leaf(c);
+            node.child = c.id;
+        }
+        tree.nodes[to] = node;
+    }
     return tree;
 }
 
@@ -236,7 +243,8 @@ Tree2 build_tree2_clusters(HugeArray<PrimBox> boxes, size_t count, ThreadPool& p
             sorted[i].unused = 0;
         }
     });
-    Clusters clusters(std::move(sorted), count, pool);
+    keys = {};
+    Clusters clusters(std::move(sorted), std::move(boxes), count, pool);
     clusters.merge_all();
     HugeArray<PrimBox> top(clusters.count());
     for (size_t i = 0; i < clusters.count(); ++i) {
@@ -244,7 +252,7 @@ Tree2 build_tree2_clusters(HugeArray<PrimBox> boxes, size_t count, ThreadPool& p
         top[i].id = u32(i);
     }
     Tree2 tree = build_tree2_binned(std::move(top), clusters.count(), 1, TOP_HALVING_LEVEL, pool);
-    return attach(std::move(tree), clusters, std::move(refs), pool);
+    return attach(tree, clusters, std::move(refs));
 }
 
 }  // namespace luch::cpu
