@@ -66,7 +66,7 @@ def describe() -> dict[str, Any]:
         "device": properties["name"].decode(),
         "multiprocessors": properties["multiProcessorCount"],
         "compute_capability": architecture_of(module) / 10,
-        "l2_bytes": properties["l2CacheSize"],
+        "l2_bytes": properties.get("l2CacheSize"),
         "memory_bytes": properties["totalGlobalMem"],
         "cuda_driver": module.cuda.runtime.driverGetVersion(),
         "cuda_runtime": module.cuda.runtime.runtimeGetVersion(),
