@@ -82,7 +82,7 @@ class Builder {
 };
 
 KdPlane Builder::choose(const Cell& cell, const KdRef* refs, size_t count) const {
-    if (cell.depth >= KD_MAX_DEPTH || count == 0) return {-1, 0.0f};
+    if (cell.depth >= KD_MAX_DEPTH || count <= 1) return {-1, 0.0f};
     if (count < settings_.exact_below) return choose_exact_plane(refs, u32(count), cell.box, cell.spare);
     KdBins bins(cell.box);
     bins.add(refs, count);
