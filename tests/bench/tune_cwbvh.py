@@ -28,6 +28,7 @@ from luch.cuda.structures import BLOCK  # noqa: E402
 # Each changes one thing of the first.
 VARIANTS: dict[str, dict[str, int]] = {
     "as it is": {},
+    "no going together": {"TOGETHER": 0},
     "4 blocks": {"BLOCKS": 4},
     "5 blocks": {"BLOCKS": 5},
     "7 blocks": {"BLOCKS": 7},

@@ -54,7 +54,9 @@ def _forget() -> None:
 
 def some_rays(mesh: Mesh, place: str) -> Any:
     count = 10_000 if place == GPU else 150
-    rays = np.concatenate([random_rays(count), aimed_rays(mesh, count)])
+    spread = 0.1 * np.stack(np.meshgrid(np.linspace(-1, 1, 8), np.linspace(-1, 1, 8)), -1).reshape(-1, 2)
+    camera = rows(np.array([0, 0, -4.0]), np.insert(spread, 2, 1.0, axis=1))  # warps of these go together
+    rays = np.concatenate([camera, random_rays(count), aimed_rays(mesh, count)])
     rays[::7, 7] = np.linspace(0.1, 2, len(rays[::7]))  # some end early
     rays[::11, 3] = 0.3
     return rays

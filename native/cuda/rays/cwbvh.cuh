@@ -17,6 +17,9 @@
 #ifndef LUCH_LOST_STEPS
 #define LUCH_LOST_STEPS 16
 #endif
+#ifndef LUCH_TOGETHER
+#define LUCH_TOGETHER 1
+#endif
 #ifndef LUCH_LEAF_SHARE
 #define LUCH_LEAF_SHARE 5
 #endif
@@ -159,15 +162,25 @@ struct Walker {
     }
 };
 
+// Whether all lanes have just begun rays that go nearly the same way (within 11 degrees of the first lane's): they will
+// meet the same nodes, and neither waiting leaves nor new rays on the way pay.
+__device__ __forceinline__ bool go_together(Vec3 direction, bool fresh) {
+    Vec3 first = {__shfl_sync(ALL_LANES, direction.x, 0), __shfl_sync(ALL_LANES, direction.y, 0),
+                  __shfl_sync(ALL_LANES, direction.z, 0)};
+    float along = dot(direction, first);
+    bool same = along > 0.0f && along * along >= 0.96f * dot(direction, direction) * dot(first, first);  // NaN: no
+    return LUCH_TOGETHER != 0 && __ballot_sync(ALL_LANES, fresh && same) == ALL_LANES;
+}
+
 // All lanes call it with theirs: tests them together, or puts them on the stacks while few lanes have any.
 template <Precision P, bool ANY>
 __device__ __forceinline__ void test_leaves(const Cwbvh& tree, const RayBatch& batch, Walker<P, ANY>& walker,
-                                            SplitStack* stack, WaitingGroup leaves) {
+                                            SplitStack* stack, WaitingGroup leaves, bool together) {
     u32 busy = u32(__popc(__ballot_sync(ALL_LANES, walker.busy)));
     for (;;) {
         u32 at_leaf = u32(__popc(__ballot_sync(ALL_LANES, leaves.hits != 0)));
         if (at_leaf == 0) return;
-        if (at_leaf * LEAF_SHARE < busy) {
+        if (!together && at_leaf * LEAF_SHARE < busy) {
             if (leaves.hits != 0) stack->push(leaves);
             return;
         }
@@ -192,15 +205,16 @@ __device__ __forceinline__ void trace_persistent(const Cwbvh& tree, const RayBat
     for (;;) {
         u32 index = pool.give(batch, !walker.busy);
         if (index != NONE) walker.begin(tree, batch, index, &stack);
+        bool together = go_together(walker.aside->tested.direction, index != NONE && walker.busy);
         u32 lost = 0;
         for (;;) {
             u32 idle = 32u - u32(__popc(__ballot_sync(ALL_LANES, walker.busy)));
             if (idle == 32u) break;
             lost += idle > SPARE_LANES ? idle - SPARE_LANES : 0u;
-            if (lost > LOST_LANE_STEPS && !pool.exhausted) break;
+            if (lost > LOST_LANE_STEPS && !together && !pool.exhausted) break;
             WaitingGroup leaves = {0, 0};
             if (walker.busy) leaves = walker.visit(tree, &stack);
-            test_leaves(tree, batch, walker, &stack, leaves);
+            test_leaves(tree, batch, walker, &stack, leaves, together);
             if (!walker.busy || has_nodes(walker.group)) continue;
             if (stack.size == 0)
                 walker.finish(batch);
