@@ -44,6 +44,7 @@ MESHES: dict[str, Mesh] = {
     "one triangle": soup(1, 1.0),
     "five triangles": soup(5, 1.0),
     "size 2^-i": separate(2.0 ** -np.arange(120)[:, None, None] * np.random.default_rng(2).normal(size=(120, 3, 3))),
+    "1e-37": scaled(1e-37),
     "1e-30": scaled(1e-30),
     "1e-18": scaled(1e-18),
     "1e-3": scaled(1e-3),

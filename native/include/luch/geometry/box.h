@@ -53,7 +53,8 @@ LUCH_FN BoxRay make_box_ray(Vec3 origin, Vec3 direction, const Box& root, float 
         out.negative[axis] = negative;
         out.near_origin[axis] = error > 0.0f ? (negative ? below(o - error) : above(o + error)) : o;
         out.far_origin[axis] = error > 0.0f ? (negative ? above(o + error) : below(o - error)) : o;
-        out.near_rdir[axis] = sign / near_d * SLAB_DOWN;
+        // A direction below 1e-38: an infinite factor would put planes out of reach that lie just ahead.
+        out.near_rdir[axis] = sign * min_f(1.0f / near_d * SLAB_DOWN, 3e38f);
         out.far_rdir[axis] = sign / far_d * SLAB_UP;
     }
     return out;
