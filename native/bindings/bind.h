@@ -10,6 +10,7 @@ void bind_bsdf(py::module_& m);
 void bind_camera(py::module_& m);
 void bind_film(py::module_& m);
 void bind_accel(py::module_& m);
+void bind_kd_short_stack(py::module_& m);
 void bind_light(py::module_& m);
 void bind_math(py::module_& m);
 void bind_render(py::module_& m);

@@ -6,6 +6,7 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_accel(m);
     luch::bindings::bind_camera(m);
     luch::bindings::bind_film(m);
+    luch::bindings::bind_kd_short_stack(m);
     luch::bindings::bind_light(m);
     luch::bindings::bind_math(m);
     luch::bindings::bind_render(m);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from luch._native import core
 from luch.accel import Accel, Kind
 from native.test_accel import HARD_MESHES
 from numpy.typing import NDArray
@@ -180,6 +181,28 @@ def test_kd_tree_tests_few_primitives() -> None:
     counts = Accel(*mesh, kind="KD_TREE", threads=1).count(rays)
     assert counts["nodes"] <= 12 * len(rays)  # 10.2 measured, of 81,920 triangles
     assert counts["primitives"] <= 1.5 * len(rays)  # 1.31
+
+
+@pytest.mark.parametrize("name", ["soup", "sphere", "sticks", "size 2^-i", "duplicates"])
+def test_kd_tree_walked_with_a_stack_of_two_finds_the_same_hits(name: str) -> None:
+    mesh = MESHES[name]
+    rays = hard_rays(mesh, 600)
+    rays = rays[np.abs(rays[:, 4:7]).max(1) > 0]
+    rays[:, 3], rays[:, 7] = np.maximum(rays[:, 3], 0), np.minimum(rays[:, 7], 3e38)
+    rays = rays[rays[:, 3] < rays[:, 7]]
+    accel = Accel(*mesh, kind="KD_TREE", threads=1)
+    view, arrays = accel._structure.device_arrays()
+    data = {name: np.frombuffer(content, np.uint32) for name, _, content in arrays}
+    found, refs = core.closest_with_short_stack(
+        data["nodes"].reshape(-1, 2),
+        data["refs"],
+        np.frombuffer(view, np.float32)[4:10],
+        mesh[0][mesh[1]].reshape(-1, 9),
+        rays,
+    )
+    t, prim, u, v = accel.closest(rays)
+    assert np.array_equal(refs.view(np.int32), prim)
+    assert np.array_equal(found, np.stack([t, u, v], 1))
 
 
 def test_grid_visits_few_cells_and_primitives() -> None:
