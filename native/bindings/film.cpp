@@ -63,12 +63,25 @@ py::dict resolve_film(const cpu::Film& film) {
     return passes;
 }
 
+py::tuple film_deviations(const cpu::Film& film) {
+    py::ssize_t height = film.height(), width = film.width();
+    Floats mean({height, width, py::ssize_t{3}}), deviation({height, width, py::ssize_t{3}});
+    float *to_mean = mean.mutable_data(), *to_deviation = deviation.mutable_data();
+    {
+        py::gil_scoped_release release;
+        cpu::ThreadPool pool(u64{film.width()} * film.height() < 65536 ? 1 : 0);
+        film.deviations(to_mean, to_deviation, pool);
+    }
+    return py::make_tuple(mean, deviation);
+}
+
 void bind_film(py::module_& m) {
     auto film = m.def_submodule("film", "Sums of samples, and render passes read from them.");
     py::class_<cpu::Film>(film, "Film")
         .def(py::init([](const py::handle& settings, const py::handle& origin, bool halves) {
                  cpu::FilmSpec spec = read_film(settings, origin);
                  spec.halves = halves;
+                 if (halves) spec.passes.push_back("Combined Half");
                  return std::make_unique<cpu::Film>(spec);
              }),
              py::arg("film"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0), py::arg("halves") = false)
@@ -100,11 +113,12 @@ void bind_film(py::module_& m) {
             "count_samples",
             [](cpu::Film& self, u32 pixel, u32 samples, bool other_half) {
                 FilmWriter writer{self.view(), 0};
-                film_count_samples(writer, pixel, other_half, samples);
+                film_count_samples(writer, pixel, samples, other_half ? samples : 0u);
             },
             py::arg("pixel"), py::arg("samples"), py::arg("other_half") = false)
         .def("merge", &cpu::Film::merge)
-        .def("resolve", &resolve_film);
+        .def("resolve", &resolve_film)
+        .def("deviations", &film_deviations);
 }
 
 }  // namespace luch::bindings

@@ -11,4 +11,7 @@ cpu::FilmSpec read_film(const py::handle& film, const py::handle& origin);
 // {pass name: float32 (H, W, channels)}, bottom row first.
 py::dict resolve_film(const cpu::Film& film);
 
+// (mean, deviation), float32 (H, W, 3), as Film::deviations has them.
+py::tuple film_deviations(const cpu::Film& film);
+
 }  // namespace luch::bindings

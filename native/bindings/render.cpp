@@ -29,6 +29,8 @@ class PyRenderer {
 
     py::dict passes() const { return resolve_film(renderer_->film()); }
 
+    py::tuple deviations() const { return film_deviations(renderer_->film()); }
+
     py::dict stats() const {
         cpu::RenderStats s = renderer_->stats();
         py::dict d;
@@ -75,6 +77,8 @@ void bind_render(py::module_& m) {
         .def("cancel", &PyRenderer::cancel, "Callable from any thread.")
         .def("step_progress", &PyRenderer::step_progress, "Share of the running step that is done, 0..1.")
         .def("passes", &PyRenderer::passes, "Blender's pass name -> float32 (H, W, C), bottom row first.")
+        .def("deviations", &PyRenderer::deviations,
+             "(mean, deviation), float32 (H, W, 3): Combined, and one draw of its error. Asks for Film.halves.")
         .def("stats", &PyRenderer::stats, "Counts, bytes and seconds.");
 }
 

@@ -377,6 +377,7 @@ struct Reader {
         input.seed = count("seed");
         input.samples = count("samples");
         input.threads = count("threads");
+        input.film.halves = py::cast<bool>(settings.attr("estimate_error"));
         input.accel = cpu::accel_request(py::cast<std::string>(settings.attr("accelerator")),
                                          py::cast<std::string>(settings.attr("precision")));
     }

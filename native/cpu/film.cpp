@@ -1,6 +1,7 @@
 #include "cpu/film.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -68,16 +69,17 @@ class LayoutBuilder {
         layout.half = layout.lightgroups = layout.aovs = NONE;
         layout.combined = take(4);
         passes.push_back({"Combined", 4, PassKind::COMBINED, layout.combined});
-        if (spec.halves) {
-            layout.half = take(4);
-            passes.push_back({"Combined Half", 3, PassKind::HALF, layout.half});
-        }
+        if (spec.halves) layout.half = take(4);
     }
 
     void add(const std::string& name) {
         if (std::any_of(passes.begin(), passes.end(), [&](const Pass& pass) { return pass.name == name; })) return;
         if (name == "Sample Count" || name == "Debug Sample Count") {
             passes.push_back({name, 1, PassKind::SAMPLE_COUNT, NONE});
+            return;
+        }
+        if (name == "Combined Half" && spec_.halves) {
+            passes.push_back({name, 3, PassKind::HALF, layout.half});
             return;
         }
         if (add_known(name) || add_crypto(name) || is_named_elsewhere(name)) return;
@@ -273,6 +275,27 @@ void Film::resolve(const std::vector<float*>& out, ThreadPool& pool) const {
                 } else {
                     read_pixel(pass, rows_.get() + pixel * layout_.stride, layout_, counts_[pixel], spec_.exposure, to);
                 }
+            }
+        }
+    });
+}
+
+void Film::deviations(float* mean, float* deviation, ThreadPool& pool) const {
+    if (layout_.half == NONE) throw std::logic_error("Film: no half was kept apart.");
+    pool.parallel_for(counts_.size(), 1024, [&](size_t begin, size_t end, unsigned) {
+        for (size_t pixel = begin; pixel < end; ++pixel) {
+            const FilmSum* row = rows_.get() + pixel * layout_.stride;
+            const FilmSum *sum = row + layout_.combined, *other = row + layout_.half;
+            double samples = counts_[pixel], others = other[3], own = samples - others;
+            double scale = samples > 0.0 ? spec_.exposure / samples : 0.0;
+            // The mean of n = a + b samples errs by (a A + b B) / n, where A and B are the halves' errors, of
+            // variances v / a and v / b: by v / n, as (A - B) sqrt(ab) / n does.
+            double weight = own > 0.0 && others > 0.0 ? std::sqrt(own * others) / samples * spec_.exposure
+                                                      : std::numeric_limits<double>::quiet_NaN();
+            for (int k = 0; k < 3; ++k) {
+                mean[pixel * 3 + k] = to_float(sum[k] * scale);
+                double difference = ((sum[k] - other[k]) / own - other[k] / others) * weight;
+                deviation[pixel * 3 + k] = to_float(difference);
             }
         }
     });

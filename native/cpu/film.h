@@ -24,7 +24,7 @@ struct FilmSpec {
         bool color;
     };
     std::vector<Aov> aovs;
-    bool halves = false;  // keep a second sum of Combined for an error estimate
+    bool halves = false;  // keep the other half of Combined apart, for estimates of the error
 };
 
 // How a pass is read from its row.
@@ -65,6 +65,11 @@ class Film {
     // Writes every pass: out[i] holds height * width * passes()[i].channels floats, bottom row first. Pixels
     // without samples are 0.
     void resolve(const std::vector<float*>& out, ThreadPool& pool) const;
+
+    // Combined without alpha and one draw of its error, from the difference of the halves: both height * width * 3
+    // floats, bottom row first. The square of a deviation has the expectation of the mean's squared error. NaN where
+    // a half has no samples. Throws std::logic_error for a film without halves.
+    void deviations(float* mean, float* deviation, ThreadPool& pool) const;
 
     // Adds what another film of the same layout holds, e.g. other samples of the same picture. What the
     // first sample sees is kept where this film has samples.

@@ -102,8 +102,14 @@ def _render(options: argparse.Namespace) -> int:
         metadata = {**_statistics(result), "luch.scene": scene.name, **cryptomatte.metadata(scene, "ViewLayer")}
         image.write_exr(options.output, result.passes, metadata=metadata)
     seconds = result.stats.get("render_seconds", 0.0)
-    print(f"{options.output}: {result.stats.get('samples', 0)} samples in {seconds:.2f} s")
+    print(f"{options.output}: {result.stats.get('samples', 0)} samples in {seconds:.2f} s{_told_error(result)}")
     return CANCELLED if result.cancelled else 0
+
+
+def _told_error(result: Result) -> str:
+    from luch.accuracy import describe
+
+    return f", {describe(result.stats)}" if "error" in result.stats else ""
 
 
 def _override(scene: Scene, options: argparse.Namespace) -> None:

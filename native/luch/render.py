@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from luch import accuracy
 from luch._native import core
 from luch.effects import effects_of
 from luch.scene import F32, Scene
@@ -178,5 +179,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         warnings=list(scene.warnings),
         effects=effects,
     )
+    if settings.estimate_error and (found := accuracy.estimate(*renderer.deviations())) is not None:
+        stats.update(found.statistics())
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
     return Result(passes, stats, cancelled)

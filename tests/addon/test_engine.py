@@ -137,6 +137,13 @@ def test_statistics_are_kept_and_written_into_the_file(room: bpy.types.Scene) ->
     assert stats["effects"]["sun lamps"]["reason"] == '"Sun"'
     assert header["luch.ViewLayer.effects"].startswith("sun lamps, ")
     assert len(header["luch.ViewLayer.effects"]) < 500, "names alone: reasons are for the statistics"
+    assert "error" not in stats, "one sample has no second half"
+    room.luch.samples = 2
+    picture(room)
+    stats = engine.last_stats[room.name]
+    header = metadata(Path(room.render.filepath))
+    for key in ("error", "error_low", "error_high", "fireflies_share"):
+        assert float(header[f"luch.ViewLayer.{key}"]) == pytest.approx(stats[key])
 
 
 def test_cryptomatte_carries_its_manifest(room: bpy.types.Scene) -> None:

@@ -166,6 +166,21 @@ def test_two_halves_are_two_means() -> None:
     assert out["Combined"][0, 0, 0] == 2 and out["Combined Half"][0, 0, 0] == 3
 
 
+def test_deviations_weigh_uneven_halves_by_their_samples() -> None:
+    film = core.film.Film(SMALL, halves=True)
+    feed(film, "Combined", [[1, 0, 0], [2, 0, 0], [3, 0, 0], [6, 0, 1]])
+    feed(film, "Combined Half", [[6, 0, 1]])
+    film.count_samples(0, 3)
+    film.count_samples(0, 1, other_half=True)
+    mean, deviation = film.deviations()
+    assert mean[0, 0].tolist() == [3, 0, 0.25]
+    # Halves of 2 and 6; variances v / 3 and v / 1 differ by 4 v / 3, and the mean of four has v / 4.
+    np.testing.assert_allclose(deviation[0, 0], [(2 - 6) * np.sqrt(3) / 4, 0, -np.sqrt(3) / 4], rtol=1e-6)
+    assert np.isnan(deviation[0, 1]).all(), "no sample, no error"
+    with pytest.raises(RuntimeError, match="no half"):
+        make().deviations()
+
+
 def test_merged_films_equal_one_film() -> None:
     settings = replace(SMALL, passes=["Depth", "Emission", "CryptoObject"])
     rng = np.random.default_rng(2)

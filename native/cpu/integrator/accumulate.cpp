@@ -37,7 +37,7 @@ void Batch::add_to_light_passes(u32 pixel, Color c, Color diffuse, Color glossy,
 void Batch::add_emission(const PathState& path, Color radiance, u32 own_pass, u32 lightgroup) {
     Color c = path.throughput * radiance;
     if (is_zero(c) || !admit(c, path.bounce > 1 ? 1 : 0)) return;
-    film_add_combined(writer_, path.pixel, false, c);
+    film_add_combined(writer_, path.pixel, path.flags & PATH_OTHER_HALF, c);
     if (!writer_.film.layout.any_light_pass && !(path.flags & PATH_FEATURES)) return;
     if (lightgroup) film_add_lightgroup(writer_, path.pixel, lightgroup - 1, c);
     if (path.flags & PATH_FEATURES) {
@@ -63,7 +63,7 @@ void Batch::add_direct(const PathState& path, const ShadowRay& shadow, Color tra
         film_add(writer_, path.pixel, writer_.film.layout.ambient_occlusion, c);
         return;
     }
-    film_add_combined(writer_, path.pixel, false, c);
+    film_add_combined(writer_, path.pixel, path.flags & PATH_OTHER_HALF, c);
     if (!writer_.film.layout.any_light_pass) return;
     if (shadow.lightgroup) film_add_lightgroup(writer_, path.pixel, shadow.lightgroup - 1, c);
     add_to_light_passes(path.pixel, c, shadow.pass_diffuse, shadow.pass_glossy, shadow.bounce == 0);

@@ -76,11 +76,13 @@ void Batch::trace(const PixelBlock& block) {
 
 void Batch::generate(const PixelBlock& block) {
     ray_count_ = 0;
+    u32 end = block.first_sample + block.sample_count;
+    u32 others = scene_.halves ? end / 2u - block.first_sample / 2u : 0u;  // odd ones
     for (int y = 0; y < block.height; y++) {
         for (int x = 0; x < block.width; x++) {
             u32 px = u32(block.x0 + x), py = u32(block.y0 + y);
-            film_count_samples(writer_, film_pixel(px, py), false, block.sample_count);
-            PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples);
+            film_count_samples(writer_, film_pixel(px, py), block.sample_count, others);
+            PixelSequences pixel = make_pixel_sequences(px, py, scene_.seed, scene_.log2_samples, scene_.halves);
             for (u32 s = 0; s < block.sample_count; s += CAMERA_LANES) {
                 u32 count = std::min(u32(CAMERA_LANES), block.sample_count - s);
                 generate_pixel(pixel, px, py, block.first_sample + s, count);
@@ -90,7 +92,7 @@ void Batch::generate(const PixelBlock& block) {
     counts_.paths += u64(ray_count_);
 }
 
-void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
+void Batch::generate_pixel(const PixelSequences& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
     // Random numbers first, of all samples: that loop vectorises.
     float filter_u[2][CAMERA_LANES], lens_u[2][CAMERA_LANES] = {};
     for (u32 i = 0; i < count; i++) {
@@ -115,6 +117,7 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
         path.continuation = 1.0f;
         path.min_pdf = 1e30f;
         path.flags = u32(PATH_CAMERA) | PATH_NO_MIS | PATH_THROUGH_FILM | (wants_features() ? u32(PATH_FEATURES) : 0u);
+        if (path.sample & u32(scene_.halves)) path.flags |= PATH_OTHER_HALF;
         path.visibility = RAY_CAMERA;
         path.dimension = DIMENSIONS_CAMERA;
         path.pixel = film_pixel(px, py);

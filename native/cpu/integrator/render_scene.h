@@ -24,6 +24,7 @@ struct RenderScene {
     PathLimits limits;
     u32 seed = 0;
     u32 log2_samples = 0;           // the sampler leaves this much room for each pixel
+    bool halves = false;            // two independent sequences a pixel, kept apart in the film
     bool has_lights = false;        // anything that sample_light could choose
     bool has_visible_lamps = false; // lamps of finite size that rays may meet
     bool has_world = false;         // one that is not black

@@ -68,6 +68,7 @@ void Renderer::build_all() {
     scene_.limits = input_.limits;
     scene_.seed = input_.seed;
     scene_.log2_samples = ceil_log2(input_.samples);
+    scene_.halves = input_.film.halves;
     scene_.mist_start = input_.mist_start;
     scene_.mist_inverse_depth = input_.mist_depth > 0.0f ? 1.0f / input_.mist_depth : 0.0f;
     scene_.mist_exponent = input_.mist_exponent;

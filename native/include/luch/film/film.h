@@ -137,10 +137,10 @@ LUCH_FN void film_add_crypto(FilmWriter& writer, u32 pixel, u32 channel, float i
     slot[1] += weight;
 }
 
-LUCH_FN void film_count_samples(FilmWriter& writer, u32 pixel, bool other_half, u32 samples) {
+// others: how many of the samples belong to the other half.
+LUCH_FN void film_count_samples(FilmWriter& writer, u32 pixel, u32 samples, u32 others) {
     writer.film.sample_counts[pixel] += samples;
-    if (other_half && writer.film.layout.half != NONE)
-        film_row(writer.film, pixel)[writer.film.layout.half + 3u] += samples;
+    if (writer.film.layout.half != NONE) film_row(writer.film, pixel)[writer.film.layout.half + 3u] += others;
 }
 
 }  // namespace luch

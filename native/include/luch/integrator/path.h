@@ -20,6 +20,7 @@ enum PathMemory : u32 {
     PATH_DATA_DONE = 1u << 22,               // depth, normal and indices are written
     PATH_FEATURES = 1u << 23,                // denoising features are still to be written
     PATH_MIS_TRANSMITS = 1u << 24,           // the surface left last could be lit from behind
+    PATH_OTHER_HALF = 1u << 25,              // its sample belongs to the half that the film keeps apart
 };
 
 struct PathState {

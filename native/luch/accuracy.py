@@ -1,0 +1,206 @@
+"""How far a picture is from the truth, told by two halves of its samples that were randomised apart.
+
+With a and b the errors of two halves of equally many samples, the picture errs by (a + b) / 2, and the deviation
+d = (a - b) / 2 is what the film gives. As a and b are independent with mean 0, d^2 and the picture's squared error have
+one expectation, for any sampler and any distribution; they differ by ab. A path that only one half found enters both
+alike, so even an error made of a few bright pixels is told well, though the next picture's may be another.
+
+The measure: relMSE = mean((I - R)^2 / (|R| + 0.01)^2) over pixels and channels (Rousselle et al. 2011), R the truth;
+its square root is "the error". Samples are drawn by the pixel filter and count for one pixel alone, so neighbours are
+not correlated by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from luch.scene import F32
+
+F64 = NDArray[np.float64]
+
+DARK = 0.01  # added to the truth before division: black has no relative error
+NORMAL_95 = 1.96  # standard deviations on either side that hold 95 % of a normal distribution
+POOL_RADIUS = 3  # pixels; 7 x 7 neighbours share one variance
+NEAR = 1  # pixels; 3 x 3 neighbours tell how unevenly the error is spread
+GUIDE_RADIUS = 2  # pixels; how far neighbours may lie that say how bright the truth may be
+GAP_VARIANCES = 4.0  # a gap of two standard deviations to the neighbours may still be noise
+TILE = 16  # pixels; edge of the tiles whose sums of deviations are taken as independent
+FIREFLIES = 0.001  # share of the pixels that are asked for their share of the error
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Errors are fractions (0.018: 1.8 %), brightness is in the unit of Combined. _low and _high: 95 % interval."""
+
+    error: float  # square root of the relMSE
+    error_low: float
+    error_high: float
+    fireflies_share: float  # of the relMSE, carried by its largest 0.1 % of pixels
+    brightness: float  # mean over pixels and channels
+    brightness_low: float
+    brightness_high: float
+
+    def statistics(self) -> dict[str, float]:
+        """For JSON and headers of files."""
+        return asdict(self)
+
+
+def _sums(image: F64, radius: int, axis: int) -> F64:
+    """Of up to 2 radius + 1 neighbours along an axis; fewer at the borders."""
+    size = image.shape[axis]
+    total = np.concatenate([np.zeros_like(np.take(image, [0], axis)), np.cumsum(image, axis)], axis)
+    middle = np.arange(size)
+    upper = np.take(total, np.minimum(middle + radius + 1, size), axis)
+    return np.asarray(upper - np.take(total, np.maximum(middle - radius, 0), axis))
+
+
+def box_sum(image: F64, radius: int = POOL_RADIUS) -> F64:
+    """Sums over squares of (2 radius + 1)^2 pixels, cut at the borders. Shape (H, W) or (H, W, C), kept."""
+    return _sums(_sums(image, radius, 0), radius, 1)
+
+
+def _measured(deviation: F32) -> tuple[F64, F64, F64]:
+    """Deviations with 0 where nothing is known, 1 or 0 for what is known (H, W, 1), and its sums over neighbours."""
+    known = np.isfinite(deviation).all(axis=2, keepdims=True)
+    return (
+        np.where(known, deviation, 0.0).astype(np.float64),
+        known.astype(np.float64),
+        box_sum(known.astype(np.float64)),
+    )
+
+
+def standard_error(deviation: F32) -> F32:
+    """Standard error of every pixel and channel: (H, W, 3) -> (H, W, 3); NaN where no neighbour is known.
+
+    One difference says little of its own pixel, and says 0 where a rare path was missed: neighbours share a variance.
+    """
+    d, _, count = _measured(deviation)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt(np.maximum(box_sum(d * d), 0.0) / count), dtype=np.float32)
+
+
+def _truth_guesses(mean: F32, d: F64, known: F64) -> list[F32]:
+    """What each pixel is divided by: the truth is not known, and a pixel's own noise must not hide its error.
+
+    The mean of those neighbours whose brightness differs by no more than noise explains (Lee's sigma filter, 1983),
+    without the pixel itself: an edge keeps its two sides, a firefly is held against what lies around it. Noise: the
+    pixel's own deviation, or that of its neighbours in proportion to brightness. One guess for each radius of
+    1..GUIDE_RADIUS.
+    """
+    grey = (known[..., 0] * mean.mean(axis=2)).astype(np.float32)
+    noise = (d.mean(axis=2) ** 2).astype(np.float32)
+    lit = box_sum((grey * grey).astype(np.float64))
+    relative = np.divide(box_sum(noise.astype(np.float64)), lit, out=np.zeros_like(lit), where=lit > 0.0)
+    noise = GAP_VARIANCES * np.maximum(noise, relative.astype(np.float32) * grey * grey)
+    total, weights = np.zeros_like(mean), np.zeros_like(grey)
+    height, width = grey.shape
+    guesses = []
+    for radius in range(1, GUIDE_RADIUS + 1):
+        for dy, dx in _ring(radius):
+            here = slice(max(0, -dy), max(0, height - dy)), slice(max(0, -dx), max(0, width - dx))
+            there = slice(max(0, dy), max(0, height + dy)), slice(max(0, dx), max(0, width + dx))
+            alike = ((grey[here] - grey[there]) ** 2 <= noise[here] + noise[there]) & (known[there][..., 0] > 0.0)
+            weights[here] += alike
+            total[here] += alike[..., None] * mean[there]
+        guesses.append(np.where(weights[..., None] > 0.5, total / np.maximum(weights, 1.0)[..., None], mean))
+    return guesses
+
+
+def _ring(radius: int) -> list[tuple[int, int]]:
+    """Offsets (dy, dx) of the pixels on a square of that radius."""
+    steps = range(-radius, radius + 1)
+    return [(dy, dx) for dy in steps for dx in steps if max(abs(dy), abs(dx)) == radius]
+
+
+def relative_deviations(mean: F32, deviation: F32) -> list[F64]:
+    """Deviations over what the truth may be, (H, W, 3); 0 where nothing is known. Mean square: the relMSE.
+
+    One for each guess at the truth; the last is the best.
+    """
+    d, known, _ = _measured(deviation)
+    mean = np.where(known > 0.0, mean, np.float32(0.0))
+    # Squares of floats stay floats: no colour above 1.
+    unit = max(float(np.abs(mean).max()), float(np.finfo(np.float32).tiny))
+    guesses = _truth_guesses(mean / np.float32(unit), d / unit, known)
+    return [d / (np.abs(truth).astype(np.float64) * unit + DARK) for truth in guesses]
+
+
+def _square(deviation: F64) -> F64:
+    return np.asarray(np.mean(deviation * deviation, axis=2))
+
+
+def _tile_sums(image: F64) -> F64:
+    """Sums over tiles of TILE^2 pixels, cut at the far borders: (H, W) -> (rows, columns)."""
+    rows = np.add.reduceat(image, np.arange(0, image.shape[0], TILE), axis=0)
+    return np.asarray(np.add.reduceat(rows, np.arange(0, image.shape[1], TILE), axis=1))
+
+
+def estimate(mean: F32, deviation: F32) -> Estimate | None:
+    """The error of a picture from Combined and its deviations, float32 (H, W, 3); None while no pixel has both halves.
+
+    The interval is for this picture's own error, not for that of pictures with other seeds: with q a pixel's share,
+    error and estimate differ by the mean of products ab, whose variance is at most 4 sum(E[q]^2) / P^2 (all of it
+    where the channels vary together). The nearest neighbours stand for E[q], as noise may lie in edges one pixel wide; pooled squares of heavy tails are larger than the
+    square of the expectation, and widen the interval. So does disagreement of the guesses at the truth.
+    """
+    d, known, _ = _measured(deviation)
+    pixels = float(known.sum())
+    if pixels == 0.0:
+        return None
+    *rougher, scaled = relative_deviations(mean, deviation)
+    squares = _square(scaled)
+    mse = float(squares.sum()) / pixels
+    pooled = np.maximum(box_sum(squares, NEAR), 0.0) / np.maximum(box_sum(known[..., 0], NEAR), 1.0)
+    noise = 2.0 * float(np.sqrt(np.sum(pooled * pooled * known[..., 0]))) / pixels
+    factor = 1.0
+    if mse > 0.0:
+        guess = max(abs(np.log(float(_square(other).sum()) / pixels / mse)) for other in rougher)
+        factor = float(np.exp(0.5 * np.hypot(NORMAL_95 * noise / mse, guess)))
+    top = np.sort(squares[known[..., 0] > 0.0])[-max(1, round(FIREFLIES * pixels)) :]
+    brightness = float((known * np.where(known > 0.0, mean, 0.0)).sum()) / (3.0 * pixels)
+    uncertainty = _uncertainty_of_sum(_tile_sums(d.mean(axis=2))) / pixels
+    error = float(np.sqrt(mse))
+    return Estimate(
+        error=error,
+        error_low=error / factor,
+        error_high=error * factor,
+        fireflies_share=float(top.sum() / squares.sum()) if mse > 0.0 else 0.0,
+        brightness=brightness,
+        brightness_low=brightness - uncertainty,
+        brightness_high=brightness + uncertainty,
+    )
+
+
+def _uncertainty_of_sum(sums: F64) -> float:
+    """Half of the 95 % interval of a total of independent sums with mean 0.
+
+    Neighbours take pieces of one sequence, so their errors cancel in part: only sums over tiles are independent. Few
+    tiles, or few that matter, tell their own spread badly: Student's distribution for as many as their squares are
+    worth, 3 (sum s^2)^2 / sum s^4 of normal ones, to second order in its inverse.
+    """
+    squares = sums * sums
+    total = float(squares.sum())
+    if total == 0.0:
+        return 0.0
+    few = float((squares * squares).sum()) / (3.0 * total * total)
+    z = NORMAL_95
+    student = z + (z**3 + z) / 4.0 * few + (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0 * few * few
+    return student * float(np.sqrt(total))
+
+
+def percent(fraction: float, digits: int = 2) -> str:
+    """0.0183 -> "1.8": so many digits that count, without the sign."""
+    if not fraction > 0.0:
+        return "0"
+    return f"{100.0 * fraction:.{max(0, digits - 1 - int(np.floor(np.log10(100.0 * fraction))))}f}"
+
+
+def describe(stats: Mapping[str, Any]) -> str:
+    """For people, from a render's statistics: "error 1.8 % (1.7 to 1.9 %)"."""
+    low, high = percent(stats["error_low"]), percent(stats["error_high"])
+    return f"error {percent(stats['error'])} % ({low} to {high} %)"

@@ -1,0 +1,70 @@
+"""What a render says of its own error, against a render with many more samples."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from luch.render import Result, render
+from luch.scene import Scene
+from support.pictures import rel_mse
+
+from addon.engine import capture_scene
+
+SIZE = 32
+REFERENCE_SAMPLES = 2048
+
+
+@pytest.fixture
+def exported(scene: bpy.types.Scene) -> Scene:
+    """A ball and a cube on a floor under a lamp and a grey sky."""
+    bpy.ops.mesh.primitive_plane_add(size=12)
+    bpy.ops.mesh.primitive_uv_sphere_add(location=(-1, 0, 1))
+    bpy.ops.mesh.primitive_cube_add(location=(1.6, 0.5, 0.8), size=1.6)
+    bpy.ops.object.light_add(type="AREA", location=(2, -3, 5), rotation=(0.6, 0.3, 0))
+    bpy.context.object.data.energy = 300
+    bpy.ops.object.camera_add(location=(0, -7, 3), rotation=(1.25, 0, 0))
+    scene.camera = bpy.context.object
+    scene.world = bpy.data.worlds.new("Grey")
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    found = capture_scene(scene, bpy.context.view_layer)
+    found.settings.accelerator = "BVH"
+    found.settings.max_bounces = 2
+    return found
+
+
+def shoot(scene: Scene, samples: int, seed: int = 0, threads: int = 0, halves: bool = True) -> Result:
+    settings = scene.settings
+    settings.samples, settings.seed, settings.threads, settings.estimate_error = samples, seed, threads, halves
+    return render(scene)
+
+
+def test_renders_know_their_error(exported: Scene) -> None:
+    reference = shoot(exported, REFERENCE_SAMPLES, 1000).passes["Combined"]
+    covered, ratios = [], []
+    for samples, seeds in ((16, 10), (33, 6)):
+        for seed in range(seeds):
+            result = shoot(exported, samples, seed)
+            stats = result.stats
+            error = np.sqrt(rel_mse(result.passes["Combined"], reference))
+            covered.append(stats["error_low"] <= error <= stats["error_high"])
+            ratios.append((stats["error"] / error) ** 2)
+            assert stats["brightness_low"] < stats["brightness"] < stats["brightness_high"]
+    assert np.mean(covered) >= 0.8  # 16 renders, and a reference with noise of its own
+    # A thousand pixels, a few of which carry most of the noise: single pictures scatter by a fifth.
+    assert 0.9 < np.median(ratios) < 1.12 and np.mean([0.8 <= ratio <= 1.25 for ratio in ratios]) >= 0.7
+
+
+def test_one_sequence_is_as_before_and_says_nothing_of_its_error(exported: Scene) -> None:
+    one, two = (shoot(exported, 8, halves=halves) for halves in (False, True))
+    assert "error" not in one.stats and 0.0 < two.stats["error_low"] < two.stats["error"]
+    assert "error" not in shoot(exported, 1).stats, "one sample has no other half"
+    first, second = shoot(exported, 1, halves=False), shoot(exported, 1)
+    assert np.array_equal(first.passes["Combined"], second.passes["Combined"])
+    assert list(two.passes) == list(one.passes)
+
+
+def test_the_error_does_not_depend_on_threads(exported: Scene) -> None:
+    one, many = (shoot(exported, 12, threads=threads) for threads in (1, 3))
+    assert one.passes["Combined"].tobytes() == many.passes["Combined"].tobytes()
+    assert one.stats["error"] == many.stats["error"]

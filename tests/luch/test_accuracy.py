@@ -1,0 +1,117 @@
+"""The error of a picture, told by its halves, against pictures whose truth is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from luch import accuracy
+from luch.scene import F32
+
+SIZE = 40
+TRIALS = 40
+Noise = Callable[[np.random.Generator, int], np.ndarray]  # relative error of the mean of n samples, (SIZE, SIZE, 3)
+
+
+def truth() -> np.ndarray:
+    """A ramp, waves, and an edge a hundred times as bright on one side."""
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    return np.stack([0.05 + x, 0.3 + 0.2 * np.sin(9 * y), np.where(x > y, 0.02, 2.0)], axis=2)
+
+
+def gaussian(rng: np.random.Generator, n: int) -> np.ndarray:
+    return 0.5 * rng.normal(size=(SIZE, SIZE, 3)) / np.sqrt(n)
+
+
+def pareto(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Tails so heavy that the fourth moment is infinite; the channels share a sample."""
+    return 0.5 * (rng.pareto(2.2, (n, SIZE, SIZE, 1)).mean(axis=0) - 1 / 1.2) * np.ones(3)
+
+
+def fireflies(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Light that one sample in 500 finds, over plain noise."""
+    hits = rng.binomial(n, 0.002, (SIZE, SIZE, 1)) / (n * 0.002)
+    return 0.15 * (hits - 1.0) * np.ones(3) + 0.2 * gaussian(rng, n)
+
+
+def picture(noise: Noise, rng: np.random.Generator, n: int) -> tuple[F32, F32]:
+    """Mean and deviation of two halves of n samples each."""
+    a, b = (truth() * (1.0 + noise(rng, n)) for _ in range(2))
+    return ((a + b) / 2).astype(np.float32), ((a - b) / 2).astype(np.float32)
+
+
+def error_of(mean: F32, right: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((mean - right) ** 2 / (right + 0.01) ** 2)))
+
+
+@pytest.mark.parametrize(("noise", "n"), [(gaussian, 2), (gaussian, 64), (pareto, 4), (pareto, 64), (fireflies, 64)])
+def test_the_estimate_holds_against_a_known_truth(noise: Noise, n: int) -> None:
+    rng = np.random.default_rng(n)
+    right = truth()
+    covered, close, bright, width = [], [], [], []
+    for _ in range(TRIALS):
+        mean, deviation = picture(noise, rng, n)
+        found = accuracy.estimate(mean, deviation)
+        assert found is not None
+        error = error_of(mean, right)
+        covered.append(found.error_low <= error <= found.error_high)
+        close.append(0.8 <= (found.error / error) ** 2 <= 1.25)
+        bright.append(found.brightness_low <= right.mean() <= found.brightness_high)
+        width.append(found.error_high / found.error_low)
+    assert np.mean(covered) >= 0.9 and np.median(width) < 1.5
+    assert np.mean(close) >= 0.9
+    assert np.mean(bright) >= 0.85  # 9 tiles of 40 x 40 pixels
+
+
+def test_the_share_of_fireflies_tells_even_noise_from_a_few_bright_pixels() -> None:
+    rng = np.random.default_rng(1)
+    mean, deviation = picture(gaussian, rng, 16)
+    even = accuracy.estimate(mean, deviation)
+    mean[20, 20] += 50.0
+    deviation[20, 20] += 50.0  # one half found it
+    one = accuracy.estimate(mean, deviation)
+    assert even is not None and one is not None
+    assert even.fireflies_share < 0.03 and one.fireflies_share > 0.9
+    assert one.error_high / one.error_low > 1.5 * even.error_high / even.error_low
+
+
+def test_standard_errors_cover_the_truth_pixel_by_pixel() -> None:
+    rng = np.random.default_rng(3)
+    right = truth()
+    for noise in (gaussian, pareto):
+        mean, deviation = picture(noise, rng, 32)
+        error = accuracy.standard_error(deviation)
+        inside = (np.abs(mean - right) <= 1.96 * error)[..., :2]  # the edge of the third mixes two brightnesses
+        assert 0.93 <= inside.mean() <= 0.99
+
+
+def test_a_picture_without_noise_has_no_error() -> None:
+    found = accuracy.estimate(truth().astype(np.float32), np.zeros((SIZE, SIZE, 3), np.float32))
+    assert found is not None
+    assert (found.error, found.error_low, found.error_high, found.fireflies_share) == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_pixels_that_one_half_has_not_reached_are_left_out() -> None:
+    mean, deviation = picture(gaussian, np.random.default_rng(4), 32)
+    whole = accuracy.estimate(mean, deviation)
+    deviation[:10] = np.nan
+    mean[:10] = 1e6
+    part = accuracy.estimate(mean, deviation)
+    assert whole is not None and part is not None
+    assert part.error == pytest.approx(whole.error, rel=0.1) and part.brightness < 2.0
+    assert np.isfinite(accuracy.standard_error(deviation)[12:]).all()
+    assert accuracy.estimate(mean, np.full_like(deviation, np.nan)) is None
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (3, 2)])
+def test_tiny_pictures_have_an_error_too(size: tuple[int, int]) -> None:
+    mean = np.ones((*size, 3), np.float32)
+    found = accuracy.estimate(mean, mean * 0.1)
+    assert found is not None and found.error == pytest.approx(0.1 / 1.01, rel=1e-5)
+
+
+def test_people_read_two_digits() -> None:
+    stats = {"error": 0.01834, "error_low": 0.0171, "error_high": 0.1234}
+    assert accuracy.describe(stats) == "error 1.8 % (1.7 to 12 %)"
+    assert (accuracy.percent(0.0), accuracy.percent(1.52), accuracy.percent(0.000456)) == ("0", "152", "0.046")
