@@ -40,6 +40,7 @@ TABLE = (
     RenderPass("Denoising Albedo", "RGB", "COLOR", "luch.use_pass_denoising"),
     RenderPass("Denoising Normal", "XYZ", "VECTOR", "luch.use_pass_denoising"),
     RenderPass("Sample Count", "X", "VALUE", "luch.use_pass_sample_count"),
+    RenderPass("Error", "RGB", "COLOR", "luch.use_pass_error"),
 )
 
 # What Luch's own switches mean in files that were set up for Cycles.

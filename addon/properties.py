@@ -135,6 +135,9 @@ class LuchViewLayerSettings(bpy.types.PropertyGroup):
         default=False,
         description="Denoising Albedo and Denoising Normal, for the compositor's Denoise node",
     )
+    use_pass_error: BoolProperty(
+        name="Error", default=False, description="Standard error of Combined, pixel by pixel, in the same unit"
+    )
     use_pass_sample_count: BoolProperty(
         name="Sample Count", default=False, description="How many paths went through each pixel"
     )

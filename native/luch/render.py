@@ -11,7 +11,7 @@ import resource
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -26,6 +26,10 @@ from luch.scene import F32, Scene
 WATCH_SECONDS = 0.1
 # Steps grow until one takes about this long; longer steps show the picture too seldom.
 STEP_SECONDS = 4.0
+# The standard error of Combined, (H, W, 3), in its unit.
+ERROR_PASS = "Error"
+# Where fewer than two samples tell nothing: files and compositors bear no infinity well.
+UNKNOWN_ERROR = np.float32(1e10)
 
 
 @dataclass
@@ -116,9 +120,11 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     fit together, naming the object.
     """
     start = time.perf_counter()
-    renderer = core.render.Renderer(scene)
+    wants_error = ERROR_PASS in scene.film.passes
+    settings = replace(scene.settings, estimate_error=scene.settings.estimate_error or wants_error)
+    film = replace(scene.film, passes=[name for name in scene.film.passes if name != ERROR_PASS])
+    renderer = core.render.Renderer(replace(scene, film=film, settings=settings))
     effects = effects_of(scene).as_dict()
-    settings = scene.settings
     total = max(1, settings.samples)
     cancelled = not _watched(renderer.prepare, renderer, lambda: progress is None or progress(_preparing(total, start)))
     prepared = time.perf_counter()
@@ -179,7 +185,12 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         warnings=list(scene.warnings),
         effects=effects,
     )
-    if settings.estimate_error and (found := accuracy.estimate(*renderer.deviations())) is not None:
-        stats.update(found.statistics())
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
+    if settings.estimate_error:
+        mean, deviation = renderer.deviations()
+        if (found := accuracy.estimate(mean, deviation)) is not None:
+            stats.update(found.statistics())
+        if wants_error:
+            error = accuracy.standard_error(deviation)
+            passes[ERROR_PASS] = np.where(np.isfinite(error), error, UNKNOWN_ERROR)
     return Result(passes, stats, cancelled)

@@ -68,3 +68,15 @@ def test_the_error_does_not_depend_on_threads(exported: Scene) -> None:
     one, many = (shoot(exported, 12, threads=threads) for threads in (1, 3))
     assert one.passes["Combined"].tobytes() == many.passes["Combined"].tobytes()
     assert one.stats["error"] == many.stats["error"]
+
+
+def test_the_error_pass_covers_the_reference_pixel_by_pixel(exported: Scene) -> None:
+    reference = shoot(exported, REFERENCE_SAMPLES, 1000).passes["Combined"][..., :3]
+    plain = shoot(exported, 32)
+    exported.film.passes = [*exported.film.passes, "Error"]
+    result = shoot(exported, 32, halves=False)  # the pass asks for the halves by itself
+    assert np.array_equal(result.passes["Combined"], plain.passes["Combined"])
+    error = result.passes["Error"]
+    assert error.shape == (SIZE, SIZE, 3) and error.dtype == np.float32
+    assert 0.9 <= np.mean(np.abs(result.passes["Combined"][..., :3] - reference) <= 1.96 * error) <= 0.995
+    assert (shoot(exported, 1).passes["Error"] == 1e10).all(), "unknown"

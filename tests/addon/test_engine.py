@@ -70,13 +70,22 @@ def test_every_pass_arrives_under_blenders_name(room: bpy.types.Scene) -> None:
     switches = [name for name in dir(layer) if name.startswith("use_pass_") and name != "use_pass_grease_pencil"]
     for name in switches:
         setattr(layer, name, True)
-    layer.luch.use_pass_denoising = layer.luch.use_pass_sample_count = True
+    layer.luch.use_pass_denoising = layer.luch.use_pass_sample_count = layer.luch.use_pass_error = True
     for name, kind in (("Mask", "VALUE"), ("Tint", "COLOR")):
         aov = layer.aovs.add()
         aov.name, aov.type = name, kind
     layer.lightgroups.add().name = "Key"
     passes = picture(room)
-    expected = {"Combined": 4, "Depth": 1, "Normal": 3, "Sample Count": 1, "CryptoObject00": 4, "Mask": 1, "Tint": 4}
+    expected = {
+        "Combined": 4,
+        "Depth": 1,
+        "Normal": 3,
+        "Sample Count": 1,
+        "Error": 3,
+        "CryptoObject00": 4,
+        "Mask": 1,
+        "Tint": 4,
+    }
     expected |= {"Combined_Key": 3, "Diffuse Direct": 3, "Denoising Albedo": 3, "UV": 3, "Object Index": 1}
     assert {name: passes[name].shape[2] for name in expected} == expected
 

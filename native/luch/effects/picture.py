@@ -16,6 +16,7 @@ PASSES = {
     "Transmission Direct": 3, "Transmission Indirect": 3, "Transmission Color": 3,
     "Emission": 3, "Environment": 3, "Ambient Occlusion": 3, "Denoising Albedo": 3, "Denoising Normal": 3,
     "Sample Count": 0,
+    "Error": 0,  # from what the estimate of the error keeps
 }  # fmt: skip
 _COUNTS_BYTES = 4  # samples of a pixel
 
