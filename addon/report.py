@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import bpy
+from luch.accuracy import percent
 from luch.scene import Scene
 
 if TYPE_CHECKING:
@@ -89,6 +90,8 @@ def progress_line(progress: Any) -> str:
     if progress.preparing:
         return "Building structures and lights"
     parts = [f"Sample {progress.samples}/{progress.total_samples}"]
+    if progress.error is not None:
+        parts.append(f"Error {percent(progress.error)} %")
     if math.isfinite(progress.remaining_seconds):
         parts.append(f"Remaining {clock(progress.remaining_seconds)}")
     parts.append(f"{progress.memory_bytes / MIB:.0f} MiB")

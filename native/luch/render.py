@@ -20,12 +20,17 @@ import numpy as np
 from luch import accuracy
 from luch._native import core
 from luch.effects import effects_of
-from luch.scene import F32, Scene
+from luch.scene import F32, Film, Scene
 
 # A step is watched this often: what a cancel waits for at most, beside one batch of paths.
 WATCH_SECONDS = 0.1
 # Steps grow until one takes about this long; longer steps show the picture too seldom.
 STEP_SECONDS = 4.0
+# The error is looked at from so many samples on, where that takes at most this share of the time so far. A look
+# takes about so many seconds a pixel (one processor of 2024).
+FIRST_LOOK = 8
+LOOK_SHARE = 0.01
+LOOK_SECONDS = 1.2e-6
 # The standard error of Combined, (H, W, 3), in its unit.
 ERROR_PASS = "Error"
 # Where fewer than two samples tell nothing: files and compositors bear no infinity well.
@@ -44,6 +49,7 @@ class Progress:
     memory_bytes: int  # of the process, at its peak
     new_picture: bool  # a step has ended since the last call: passes() shows more than before
     passes: Callable[[], dict[str, F32]]
+    error: float | None = None  # of the picture at the last look, as in luch.accuracy
     preparing: bool = False  # structures and lights are being built; no sample was traced yet
 
 
@@ -112,6 +118,26 @@ def _next_count(done: int, total: int, seconds: float) -> int:
     return max(1, min(done, by_time, total - done))
 
 
+def film_pixels(film: Film) -> int:
+    """Pixels of the rendered region."""
+    x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
+    return (x1 - x0) * (y1 - y0)
+
+
+def _told_by(curve: accuracy.Curve) -> dict[str, Any]:
+    """Statistics of the error; none where nothing is known."""
+    if not curve.points:
+        return {}
+    found = curve.points[-1][2]
+    told: dict[str, Any] = dict(found.statistics())
+    told["error_curve"] = [[samples, round(seconds, 3), point.error] for samples, seconds, point in curve.points]
+    told["error_rate"] = curve.rate()
+    if found.error > 0.0:
+        told["next_error"] = accuracy.next_target(found.error)
+        told["seconds_to_next_error"] = curve.seconds_to(told["next_error"])
+    return told
+
+
 def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) -> Result:
     """Renders ``scene`` as its settings say, until its samples or its time limit are reached.
 
@@ -149,11 +175,29 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
                 peak_memory_bytes(),
                 new_picture,
                 renderer.passes,
+                error=curve.points[-1][2].error if curve.points else None,
             )
         )
 
     def out_of_time() -> bool:
         return settings.time_limit > 0.0 and time.perf_counter() - prepared >= settings.time_limit
+
+    curve = accuracy.Curve()
+
+    def look(last: bool) -> None:
+        """A point of the curve: at every doubling of the samples, where it costs next to nothing, and at the end."""
+        seconds = time.perf_counter() - prepared
+        due = done >= 2 * curve.points[-1][0] if curve.points else done >= FIRST_LOOK
+        cheap = LOOK_SECONDS * film_pixels(scene.film) <= LOOK_SHARE * seconds
+        seen = bool(curve.points) and curve.points[-1][0] == done
+        if last and seen and done < total:
+            curve.points.pop()  # the film holds more since: parts of a step that was cut off
+        elif seen:
+            return
+        if settings.estimate_error and (last or (due and cheap)):
+            found = accuracy.estimate(*renderer.deviations())
+            if found is not None:
+                curve.add(done, seconds, found)
 
     timed_out = False
     while done < total and not cancelled and not timed_out:
@@ -169,13 +213,16 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         if not cancelled and not timed_out:
             done += count
             timed_out = out_of_time()
+            look(False)
             cancelled = not tell(done, 0, True)
+    render_seconds = time.perf_counter() - prepared
+    look(True)
     stats = dict(renderer.stats())
     stats.update(
         samples=done,
         samples_asked=total,
         prepare_seconds=prepared - start,
-        render_seconds=time.perf_counter() - prepared,
+        render_seconds=render_seconds,
         seed=settings.seed,
         device="CPU",
         instruction_set=core.__name__.rsplit("_", 1)[-1],
@@ -186,11 +233,8 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         effects=effects,
     )
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
-    if settings.estimate_error:
-        mean, deviation = renderer.deviations()
-        if (found := accuracy.estimate(mean, deviation)) is not None:
-            stats.update(found.statistics())
-        if wants_error:
-            error = accuracy.standard_error(deviation)
-            passes[ERROR_PASS] = np.where(np.isfinite(error), error, UNKNOWN_ERROR)
+    stats.update(_told_by(curve))
+    if wants_error:
+        error = accuracy.standard_error(renderer.deviations()[1])
+        passes[ERROR_PASS] = np.where(np.isfinite(error), error, UNKNOWN_ERROR)
     return Result(passes, stats, cancelled)

@@ -68,6 +68,8 @@ def test_the_error_does_not_depend_on_threads(exported: Scene) -> None:
     one, many = (shoot(exported, 12, threads=threads) for threads in (1, 3))
     assert one.passes["Combined"].tobytes() == many.passes["Combined"].tobytes()
     assert one.stats["error"] == many.stats["error"]
+    assert one.stats["error_curve"][-1][::2] == [12, one.stats["error"]]
+    assert one.stats["next_error"] < one.stats["error"] and one.stats["seconds_to_next_error"] > 0.0
 
 
 def test_the_error_pass_covers_the_reference_pixel_by_pixel(exported: Scene) -> None:

@@ -115,3 +115,15 @@ def test_people_read_two_digits() -> None:
     stats = {"error": 0.01834, "error_low": 0.0171, "error_high": 0.1234}
     assert accuracy.describe(stats) == "error 1.8 % (1.7 to 12 %)"
     assert (accuracy.percent(0.0), accuracy.percent(1.52), accuracy.percent(0.000456)) == ("0", "152", "0.046")
+
+
+def test_the_curve_foretells_the_time_to_less_error() -> None:
+    curve = accuracy.Curve()
+    assert curve.seconds_to(0.01) == float("inf") and curve.rate() == 1.0
+    for n in (8, 16, 32, 64, 128):
+        error = 0.5 * n**-0.6
+        curve.add(n, 0.1 * n, accuracy.Estimate(error, error / 1.02, error * 1.02, 0.0, 1.0, 1.0, 1.0))
+    assert curve.rate() == pytest.approx(1.2, abs=0.02)
+    assert curve.seconds_to(error / 2) == pytest.approx(12.8 * (2 ** (1 / 0.6) - 1), rel=0.05)
+    assert curve.seconds_to(2 * error) == 0.0
+    assert [accuracy.next_target(e) for e in (0.018, 0.0125, 0.9, 0.6)] == pytest.approx([0.01, 0.01, 0.5, 0.2])
