@@ -48,6 +48,11 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         default="WATERTIGHT",
         description="How exactly rays and triangles are compared",
     )
+    estimate_error: BoolProperty(
+        name="Estimate Error",
+        default=True,
+        description="Keep two halves of the samples apart, so that the render knows its error with an interval",
+    )
     threads: IntProperty(name="Threads", default=0, min=0, max=1024, description="Threads to use; 0 for all")
     samples: IntProperty(name="Max Samples", default=128, min=1, max=1 << 24, description="Paths through every pixel")
     time_limit: FloatProperty(

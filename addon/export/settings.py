@@ -38,6 +38,7 @@ def export_settings(context: ExportContext) -> Settings:
         light_tree=effective(scene, "use_light_tree"),
         accelerator=scene.luch.accelerator,
         precision=scene.luch.precision,
+        estimate_error=scene.luch.estimate_error,
         **{name: effective(scene, name) for name in SAME_NAME},
     )
     if context.view_layer.samples > 0:

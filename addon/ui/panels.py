@@ -41,7 +41,9 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
     bl_label = "Sampling"
 
     def draw(self, context: Any) -> None:
-        draw_settings(self.layout, context.scene, "samples", "time_limit", "seed", "use_animated_seed")
+        draw_settings(
+            self.layout, context.scene, "samples", "time_limit", "seed", "use_animated_seed", "estimate_error"
+        )
         row = self.layout.row(align=True)
         row.prop(context.scene.luch, "follow_cycles")
         row.operator("luch.follow_cycles", text="", icon="LOOP_BACK")

@@ -13,6 +13,7 @@ not correlated by it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -29,6 +30,10 @@ POOL_RADIUS = 3  # pixels; 7 x 7 neighbours share one variance
 NEAR = 1  # pixels; 3 x 3 neighbours tell how unevenly the error is spread
 GUIDE_RADIUS = 2  # pixels; how far neighbours may lie that say how bright the truth may be
 GAP_VARIANCES = 4.0  # a gap of two standard deviations to the neighbours may still be noise
+BAND, HALO = (
+    64,
+    POOL_RADIUS + GUIDE_RADIUS,
+)  # rows worked on together, small enough for a cache; rows they look at beside
 TILE = 16  # pixels; edge of the tiles whose sums of deviations are taken as independent
 PRIOR_RATE, PRIOR_SPREAD = 1.0, 0.1  # independent samples fall by 1 / n; well spread ones a little faster
 POINT_SPREAD = 0.05  # of the logarithm of a relMSE, beside its interval
@@ -128,8 +133,17 @@ def relative_deviations(mean: F32, deviation: F32) -> list[F64]:
     mean = np.where(known > 0.0, mean, np.float32(0.0))
     # Squares of floats stay floats: no colour above 1.
     unit = max(float(np.abs(mean).max()), float(np.finfo(np.float32).tiny))
-    guesses = _truth_guesses(mean / np.float32(unit), d / unit, known)
-    return [d / (np.abs(truth).astype(np.float64) * unit + DARK) for truth in guesses]
+
+    def of_band(first: int) -> list[F64]:
+        """The same for some rows, with all the rows around them that they look at."""
+        above = min(first, HALO)
+        rows, around = slice(first, first + BAND), slice(first - above, first + BAND + HALO)
+        guesses = _truth_guesses(mean[around] / np.float32(unit), d[around] / unit, known[around])
+        return [d[rows] / (np.abs(truth[above : above + BAND]).astype(np.float64) * unit + DARK) for truth in guesses]
+
+    with ThreadPoolExecutor() as pool:  # NumPy lets go of the interpreter's lock
+        bands = list(pool.map(of_band, range(0, len(d), BAND)))
+    return [np.concatenate(parts) for parts in zip(*bands, strict=True)]
 
 
 def _square(deviation: F64) -> F64:

@@ -7,36 +7,17 @@ import pytest
 from luch.accel import Accel, Precision
 from numpy.typing import NDArray
 from support.accel_meshes import (
-    Mesh,
+    HARD_MESHES,
     aimed_rays,
-    cube,
     differences,
     icosphere,
     random_rays,
     rows,
     separate,
-    slivers,
     soup,
 )
 
 RAYS = 3000
-HARD_MESHES: dict[str, Mesh] = {
-    "soup": soup(),
-    "small triangles": soup(1500, 0.02),
-    "slivers": slivers(1e-3),
-    "needles": slivers(1e-7),
-    "collinear": slivers(0.0),
-    "coplanar": (soup()[0] * np.float32([1, 1, 0]), soup()[1]),
-    "duplicates": tuple(np.tile(a, (5, 1)) for a in soup(120)),  # type: ignore[dict-item]
-    "identical": tuple(np.tile(a, (300, 1)) for a in soup(1, 1.0)),  # type: ignore[dict-item]
-    "points": separate(np.repeat(np.random.default_rng(1).normal(size=(200, 1, 3)), 3, axis=1)),
-    "sphere": icosphere(3),
-    "squashed sphere": (icosphere(3)[0] * np.float32([1, 1, 1e-6]), icosphere(3)[1]),
-    "grid cube": cube(8, 3),
-    "one triangle": soup(1, 1.0),
-    "five triangles": soup(5, 1.0),
-    "size 2^-i": separate(2.0 ** -np.arange(120)[:, None, None] * np.random.default_rng(2).normal(size=(120, 3, 3))),
-}
 
 
 @pytest.mark.parametrize("name", HARD_MESHES)

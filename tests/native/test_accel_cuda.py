@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 from luch.accel import Accel
 from luch.cuda import compiler, device
-from native.test_accel import HARD_MESHES
 from support import cuda_on_cpu
-from support.accel_meshes import Mesh, aimed_rays, random_rays, rows, soup
+from support.accel_meshes import HARD_MESHES, Mesh, aimed_rays, random_rays, rows, soup
 
 from buildtools.kernels import faults
 

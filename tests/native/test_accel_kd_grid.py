@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from luch._native import core
 from luch.accel import Accel, Kind
-from native.test_accel import HARD_MESHES
 from numpy.typing import NDArray
-from support.accel_meshes import F32, Mesh, aimed_rays, icosphere, random_rays, rows, separate, soup
+from support.accel_meshes import F32, HARD_MESHES, Mesh, aimed_rays, icosphere, random_rays, rows, separate, soup
 
 KINDS: tuple[Kind, ...] = ("KD_TREE", "GRID", "HIERARCHICAL_GRID")
 RAYS = 1500

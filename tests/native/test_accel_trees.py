@@ -8,7 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 from luch.accel import QUALITIES, Accel, Kind, Quality
-from support.accel_meshes import F32, Mesh, aimed_rays, cube, icosphere, random_rays, rows, separate, slivers, soup
+from support.accel_meshes import (
+    F32,
+    HARD_MESHES,
+    Mesh,
+    aimed_rays,
+    cube,
+    icosphere,
+    random_rays,
+    rows,
+    separate,
+    soup,
+)
 
 RAYS = 800  # of each sort
 KINDS: tuple[Kind, ...] = ("BVH2", "BVH2_STACKLESS", "CWBVH")
@@ -29,22 +40,7 @@ def moved(distance: float) -> Mesh:
 
 
 MESHES: dict[str, Mesh] = {
-    "soup": soup(),
-    "small triangles": soup(1500, 0.02),
-    "slivers": slivers(1e-3),
-    "needles": slivers(1e-7),
-    "collinear": slivers(0.0),
-    "coplanar": (soup()[0] * np.float32([1, 1, 0]), soup()[1]),
-    "duplicates": tuple(np.tile(a, (5, 1)) for a in soup(120)),  # type: ignore[dict-item]
-    "identical": tuple(np.tile(a, (300, 1)) for a in soup(1, 1.0)),  # type: ignore[dict-item]
-    "points": separate(np.repeat(np.random.default_rng(1).normal(size=(200, 1, 3)), 3, axis=1)),
-    "sphere": icosphere(3),
-    "squashed sphere": (icosphere(3)[0] * np.float32([1, 1, 1e-6]), icosphere(3)[1]),
-    "grid cube": cube(8, 3),
-    "one triangle": soup(1, 1.0),
-    "five triangles": soup(5, 1.0),
-    "size 2^-i": separate(2.0 ** -np.arange(120)[:, None, None] * np.random.default_rng(2).normal(size=(120, 3, 3))),
-    "1e-37": scaled(1e-37),
+    **HARD_MESHES,
     "1e-30": scaled(1e-30),
     "1e-18": scaled(1e-18),
     "1e-3": scaled(1e-3),
