@@ -42,7 +42,11 @@ def test_wheel_holds_every_module_of_the_core_and_no_foreign_one(extension_zip: 
     packed = set(zipfile.ZipFile(archive.extract(wheel, tmp_path)).namelist())
     sources = {f"luch/{path.relative_to(ROOT / 'native/luch')}" for path in (ROOT / "native/luch").rglob("*.py")}
     cores = {f"luch/{path.name}" for path in (ROOT / "native/luch").glob("_core_*cpython-313*.so")}
-    assert {name for name in packed if name.startswith("luch/")} == sources | cores
+    native = ROOT / "native"  # what luch/cuda compiles on the user's machine
+    device = {f"luch/include/{path.relative_to(native / 'include')}" for path in (native / "include").rglob("*.*")}
+    device |= {f"luch/cuda_source/{path.relative_to(native / 'cuda')}" for path in (native / "cuda").rglob("*.*")}
+    ahead = {f"luch/{path.relative_to(native / 'luch')}" for path in (native / "luch").rglob("*.cubin")}
+    assert {name for name in packed if name.startswith("luch/")} == sources | cores | device | ahead
 
 
 def test_installed_from_the_zip_into_an_empty_user_folder_it_renders(extension_zip: Path, tmp_path: Path) -> None:
