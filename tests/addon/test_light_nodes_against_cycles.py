@@ -90,4 +90,7 @@ def test_a_lamp_shines_as_in_cycles(scene: Any, render: Render, kind: str, node:
     cycles, luch = (render(engine, width=12, height=9, samples=64)[..., :3] for engine in ("CYCLES", "LUCH"))
     apart = np.abs(luch - cycles) / np.maximum(1.0, np.abs(cycles))
     assert np.median(apart) < 2e-3
-    assert abs(luch.mean() - cycles.mean()) < 5e-3 * np.abs(cycles).mean() + 1e-4
+    means_apart = np.abs(
+        luch.mean(axis=(0, 1)) - cycles.mean(axis=(0, 1))
+    )  # by channel: u and v may err against each other
+    assert (means_apart < 5e-3 * np.abs(cycles).mean(axis=(0, 1)).max() + 1e-4).all()
