@@ -19,6 +19,6 @@ def pytest_collection_modifyitems(config: Any, items: list[Any]) -> None:
         return
     from luch.cuda import available
 
-    if marked and not available():
+    if not available():
         config.hook.pytest_deselected(items=marked)
         items[:] = [item for item in items if item not in marked]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import subprocess
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from luch.bench.rays import KINDS
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
+Rows = list[dict[str, Any]]
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "rays.md"
 CUDA_RECORD = ROOT / "tests" / "bench" / "records" / "rays-cuda.json"  # by `python -m luch bench rays --device cuda`
@@ -21,7 +23,10 @@ CUDA_RECORD = ROOT / "tests" / "bench" / "records" / "rays-cuda.json"  # by `pyt
 
 def write_page(rows: list[dict[str, Any]], means: dict[str, dict[str, float]]) -> None:
     """The CPU's race. Raises ValueError if the page has no marks for it."""
-    _replace("race", [_where(), *_tables(rows), _means(means), "![Mrays/s by structure](rays.png)"])
+    columns = ["build, ms/Mtri", "bytes/triangle", "nodes, tests of a diffuse ray"]
+    _replace(
+        "race", [_where(), *_tables(rows, columns, _lines_of_race), _means(means), "![Mrays/s by structure](rays.png)"]
+    )
     _plot(rows)
 
 
@@ -31,21 +36,17 @@ def write_cuda_part() -> None:
     machine, rows = record["machine"], record["rows"]
     where = (f"Measured on one {machine['device']}, driver {machine['cuda_driver']}, {record['date']}, "
              f"commit {record['commit']}, {record['rays']:,} rays a launch.")  # fmt: skip
-    tables = []
-    for mesh in dict.fromkeys(row["mesh"] for row in rows):
-        own = [row for row in rows if row["mesh"] == mesh]
-        lines = [f"**{mesh}**, {own[0]['triangles']:,} triangles", ""]
-        lines.append("| structure | " + " | ".join(f"{kind}, Mrays/s" for kind in KINDS)
-                     + " | registers | occupancy | nodes, tests of a diffuse ray | bytes/triangle |")  # fmt: skip
-        lines.append("|---|" + "---:|" * (len(KINDS) + 4))
+
+    def lines_of(own: Rows) -> Iterator[list[str]]:
         for name in dict.fromkeys(row["structure"] for row in own):
             by_rays = {row["rays"]: row for row in own if row["structure"] == name}
             rates = [f"{by_rays[kind]['mrays_per_s']:,.4g}" if kind in by_rays else "" for kind in KINDS]
             one = by_rays["diffuse"]
-            lines.append(f"| {name} | " + " | ".join(rates) + f" | {one['registers']} | {one['occupancy']:.2f} | "
-                         f"{one['nodes']:.1f}, {one['primitives']:.1f} | {one['bytes_per_triangle']:.0f} |")  # fmt: skip
-        tables.append("\n".join(lines))
-    _replace("cuda", [where, *tables])
+            yield [name, *rates, str(one["registers"]), f"{one['occupancy']:.2f}",
+                   f"{one['nodes']:.1f}, {one['primitives']:.1f}", f"{one['bytes_per_triangle']:.0f}"]  # fmt: skip
+
+    columns = ["registers", "occupancy", "nodes, tests of a diffuse ray", "bytes/triangle"]
+    _replace("cuda", [where, *_tables(rows, columns, lines_of)])
 
 
 def _replace(name: str, parts: list[str]) -> None:
@@ -63,30 +64,37 @@ def _where() -> str:
     return f"Measured on {names[0] if names else platform.processor()}, one thread, commit {commit}."
 
 
-def _tables(rows: list[dict[str, Any]]) -> list[str]:
+def _lines_of_race(own: Rows) -> Iterator[list[str]]:
+    for row in own:
+        work = f"{row['diffuse_nodes']:.1f}, {row['diffuse_tests']:.1f}" if "diffuse_nodes" in row else ""
+        rates = [f"{row[kind]:.3g}" for kind in KINDS]
+        yield [row["contestant"], *rates, f"{row['build_ms_per_mtri']:.0f}", f"{row['bytes_per_triangle']:.0f}", work]
+
+
+def _tables(rows: Rows, columns: list[str], lines_of: Callable[[Rows], Iterable[list[str]]]) -> list[str]:
+    """One table a mesh: a structure's name, its rates by kind of ray, then the columns named."""
     tables = []
     for mesh in dict.fromkeys(row["mesh"] for row in rows):
         own = [row for row in rows if row["mesh"] == mesh]
-        lines = [f"**{mesh}**, {own[0]['triangles']:,} triangles", ""]
-        lines.append("| structure | " + " | ".join(f"{kind}, Mrays/s" for kind in KINDS)
-                     + " | build, ms/Mtri | bytes/triangle | nodes, tests of a diffuse ray |")  # fmt: skip
-        lines.append("|---|" + "---:|" * (len(KINDS) + 3))
-        for row in own:
-            work = f"{row['diffuse_nodes']:.1f}, {row['diffuse_tests']:.1f}" if "diffuse_nodes" in row else ""
-            lines.append(f"| {row['contestant']} | " + " | ".join(f"{row[kind]:.3g}" for kind in KINDS)
-                         + f" | {row['build_ms_per_mtri']:.0f} | {row['bytes_per_triangle']:.0f} | {work} |")  # fmt: skip
-        tables.append("\n".join(lines))
+        table = _table(["structure", *(f"{kind}, Mrays/s" for kind in KINDS), *columns], lines_of(own))
+        tables.append(f"**{mesh}**, {own[0]['triangles']:,} triangles\n\n{table}")
     return tables
 
 
+def _table(head: list[str], lines: Iterable[list[str]]) -> str:
+    """In Markdown, all columns but the first right-aligned."""
+    rule = "|---|" + "---:|" * (len(head) - 1)
+    return "\n".join([_line(head), rule, *map(_line, lines)])
+
+
+def _line(cells: list[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
 def _means(means: dict[str, dict[str, float]]) -> str:
-    lines = ["Geometric means over the meshes (rates: above 1 the first is faster; build: below 1 it is):", ""]
-    lines.append("| | " + " | ".join([*KINDS, "build"]) + " |")
-    lines.append("|---|" + "---:|" * (len(KINDS) + 1))
-    lines += [
-        f"| {name} | " + " | ".join(f"{value:.2f}" for value in row.values()) + " |" for name, row in means.items()
-    ]
-    return "\n".join(lines)
+    said = "Geometric means over the meshes (rates: above 1 the first is faster; build: below 1 it is):"
+    lines = ([name, *(f"{value:.2f}" for value in row.values())] for name, row in means.items())
+    return said + "\n\n" + _table(["ratio", *KINDS, "build"], lines)
 
 
 def _plot(rows: list[dict[str, Any]]) -> None:
