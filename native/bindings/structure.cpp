@@ -36,7 +36,8 @@ class ArrayStructure {
         for (u32 t = 0; t < triangle_count; ++t)
             if (gather(p, vertex_count, index + 3 * size_t(t), corners_.data() + 9 * size_t(t))) refs_.push_back(t);
         for (u32 k = 0; k < sphere_count; ++k)
-            if (usable(s + 4 * size_t(k), 4) && s[4 * size_t(k) + 3] > 0.0f) refs_.push_back(triangle_count + k);
+            if (sphere_can_be_traced({vec3_of(s + 4 * size_t(k)), s[4 * size_t(k) + 3]}))
+                refs_.push_back(triangle_count + k);
         dropped_ = triangle_count + sphere_count - refs_.size();
         Primitives all = {corners_.data(), spheres_.data(), flags_.empty() ? nullptr : flags_.data(), triangle_count,
                           sphere_count};
@@ -115,17 +116,12 @@ class ArrayStructure {
     }
 
  private:
-    static bool usable(const float* x, int count) {
-        for (int k = 0; k < count; ++k)
-            if (!(abs_f(x[k]) <= 1e37f)) return false;
-        return true;
-    }
     static bool gather(const float* positions, u32 vertex_count, const u32* index, float* corners) {
         for (int k = 0; k < 3; ++k) {
             if (index[k] >= vertex_count) return false;
             std::copy_n(positions + 3 * size_t(index[k]), 3, corners + 3 * k);
         }
-        return usable(corners, 9) && triangle_has_area(vec3_of(corners), vec3_of(corners + 3), vec3_of(corners + 6));
+        return triangle_can_be_traced(vec3_of(corners), vec3_of(corners + 3), vec3_of(corners + 6));
     }
     static py::dict counts(const Counters& total) {
         py::dict out;

@@ -5,14 +5,12 @@ namespace luch::cpu {
 namespace {
 
 constexpr float CELLS_PER_PRIMITIVE = 5.0f;
-constexpr u64 MOST_REFS_PER_PRIMITIVE = 12, REFS_OF_SMALL_GRIDS = 1u << 16;
 
 class GridStructure final : public StructureOf<Grid> {
  public:
     GridStructure(const StructureInput& input, ThreadPool& pool) : StructureOf(input.primitives) {
-        Box box = input.count ? empty_box() : Box{make_vec3(0.0f), make_vec3(0.0f)};
-        for (u32 i = 0; i < input.count; ++i) extend(box, primitive_box(primitives_, input.refs[i]));
-        u64 most_refs = MOST_REFS_PER_PRIMITIVE * input.count + REFS_OF_SMALL_GRIDS;
+        Box box = box_of_primitives(primitives_, input.refs, input.count);
+        u64 most_refs = most_refs_of(input.count);
         u32 bits = choose_grid_bits(primitives_, input.refs, input.count, box, CELLS_PER_PRIMITIVE, most_refs, pool);
         cells_ = fill_grid(primitives_, input.refs, input.count, box, bits, pool);
         view_ = {cells_.shape, cells_.first.data(), cells_.refs.data()};

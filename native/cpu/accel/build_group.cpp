@@ -36,10 +36,9 @@ class Gather {
             const float* p = scene_.positions + 3 * (size_t(mesh.first_vertex) + indices[k]);
             Vec3 point = {p[0], p[1], p[2]};
             if (member.instance != NONE) point = transform_point(scene_.instances[member.instance].to_world, point);
-            if (!(max_component(abs_v(point)) <= 1e37f) || !finite_v(point)) return false;
             out->p[k] = point;
         }
-        return triangle_has_area(out->p[0], out->p[1], out->p[2]);
+        return triangle_can_be_traced(out->p[0], out->p[1], out->p[2]);
     }
     u32 flagged(u32 ref, const Member& member) const {
         if (flags_.empty() || flags_[member.mesh].empty()) return ref;

@@ -17,7 +17,6 @@ constexpr u32 LARGE = 1u << 15;       // a cell of more is divided by all thread
 // cells that hold any, of a long one all, as a teapot may fill one cell alone and be divided there.
 constexpr double WORTHWHILE = 0.45;
 constexpr u32 LONG_LIST = 64;
-constexpr u64 MOST_REFS_PER_PRIMITIVE = 12, REFS_OF_SMALL_GRIDS = 1u << 16;
 
 // A cell to be divided: its number in the built cells, what it is, and its primitives.
 struct DenseCell {
@@ -50,9 +49,8 @@ Box off_centre(Box box, u32 bits) {
 class HierarchicalGridStructure final : public StructureOf<HierarchicalGrid> {
  public:
     HierarchicalGridStructure(const StructureInput& input, ThreadPool& pool) : StructureOf(input.primitives) {
-        Box box = input.count ? empty_box() : Box{make_vec3(0.0f), make_vec3(0.0f)};
-        for (u32 i = 0; i < input.count; ++i) extend(box, primitive_box(primitives_, input.refs[i]));
-        u64 most_refs = MOST_REFS_PER_PRIMITIVE * input.count + REFS_OF_SMALL_GRIDS;
+        Box box = box_of_primitives(primitives_, input.refs, input.count);
+        u64 most_refs = most_refs_of(input.count);
         u32 bits =
             choose_grid_bits(primitives_, input.refs, input.count, box, OUTER_CELLS_PER_PRIMITIVE, most_refs / 2, pool);
         GridCells outer = fill_grid(primitives_, input.refs, input.count, off_centre(box, bits), bits, pool);
@@ -105,8 +103,7 @@ void HierarchicalGridStructure::add_grid(const GridCells& grid, std::vector<Dens
 
 std::optional<GridCells> HierarchicalGridStructure::make_grid(const DenseCell& cell, u64 most_refs,
                                                               ThreadPool& pool) const {
-    Box box = empty_box();
-    for (u32 ref : cell.refs) extend(box, primitive_box(primitives_, ref));
+    Box box = box_of_primitives(primitives_, cell.refs.data(), u32(cell.refs.size()));
     box = {max_v(box.lo, cell.box.lo), min_v(box.hi, cell.box.hi)};
     u32 count = u32(cell.refs.size());
     u32 bits = choose_grid_bits(primitives_, cell.refs.data(), count, box, INNER_CELLS_PER_PRIMITIVE, most_refs, pool);

@@ -153,6 +153,13 @@ void list_chunk(const Primitives& all, const u32* refs, u32 count, const GridSha
 
 }  // namespace
 
+Box box_of_primitives(const Primitives& all, const u32* refs, u32 count) {
+    if (count == 0) return {make_vec3(0.0f), make_vec3(0.0f)};
+    Box box = empty_box();
+    for (u32 i = 0; i < count; ++i) extend(box, primitive_box(all, refs[i]));
+    return box;
+}
+
 GridShape shape_grid(const Box& box, u32 bits) {
     GridShape out;
     out.lo = box.lo;

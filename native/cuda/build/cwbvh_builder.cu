@@ -4,8 +4,6 @@
 
 namespace luch {
 
-inline constexpr float LARGEST_COORDINATE = 1e37f;  // as bindings/structure.cpp drops primitives
-
 __device__ __forceinline__ u32 build_index() { return blockIdx.x * blockDim.x + threadIdx.x; }
 
 // Every third bit: x's 21 lowest.
@@ -28,9 +26,7 @@ LUCH_BUILD_KERNEL(mark_usable)(const luch::BuildTask task) {
     luch::u32 i = luch::build_index();
     if (i >= task.count) return;
     const float* p = task.corners + 9 * luch::u64(i);
-    bool usable = true;
-    for (int k = 0; k < 9; ++k) usable = usable && luch::abs_f(p[k]) <= luch::LARGEST_COORDINATE;
-    task.usable[i] = usable && luch::triangle_has_area(luch::vec3_of(p), luch::vec3_of(p + 3), luch::vec3_of(p + 6));
+    task.usable[i] = luch::triangle_can_be_traced(luch::vec3_of(p), luch::vec3_of(p + 3), luch::vec3_of(p + 6));
 }
 
 LUCH_BUILD_KERNEL(make_boxes)(const luch::BuildTask task) {

@@ -4,6 +4,7 @@
 #pragma once
 #include "luch/geometry/precision.h"
 #include "luch/geometry/ray.h"
+#include "luch/geometry/triangle.h"
 #include "luch/math/vec.h"
 
 namespace luch {
@@ -15,6 +16,10 @@ struct Sphere {
 
 LUCH_FN float root_of(float x) { return __builtin_sqrtf(x); }
 LUCH_FN double root_of(double x) { return __builtin_sqrt(x); }
+
+LUCH_FN bool sphere_can_be_traced(const Sphere& sphere) {  // NaN: no
+    return point_can_be_traced(sphere.center) && sphere.radius > 0.0f && sphere.radius <= LARGEST_COORDINATE;
+}
 
 // Both distances along the ray, near then far, in F; false if the line misses or the sphere has no size.
 template <class F>

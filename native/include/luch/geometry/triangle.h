@@ -49,6 +49,19 @@ LUCH_FN bool triangle_has_area(Vec3 p0, Vec3 p1, Vec3 p2) {
     return ay * bz != az * by || az * bx != ax * bz || ax * by != ay * bx;
 }
 
+// Larger ones overflow in the boxes and products of the tests.
+inline constexpr float LARGEST_COORDINATE = 1e37f;
+
+LUCH_FN bool point_can_be_traced(Vec3 p) {  // NaN: no
+    return abs_f(p.x) <= LARGEST_COORDINATE && abs_f(p.y) <= LARGEST_COORDINATE && abs_f(p.z) <= LARGEST_COORDINATE;
+}
+
+// What every builder leaves out, on the CPU and on CUDA alike, so that they have the same triangles to hit.
+LUCH_FN bool triangle_can_be_traced(Vec3 p0, Vec3 p1, Vec3 p2) {
+    return point_can_be_traced(p0) && point_can_be_traced(p1) && point_can_be_traced(p2) &&
+           triangle_has_area(p0, p1, p2);
+}
+
 // False for rays that can hit nothing: not finite, no direction, an empty or NaN interval.
 LUCH_FN bool ray_is_valid(const Ray& ray) {
     Vec3 a = abs_v(ray.direction);
