@@ -48,9 +48,10 @@ LUCH_FN_SLOW Vec2 lamp_parametric(const LampView& lamp, Vec3 point, Vec3 normal,
                 saturate_f(0.5f + 0.5f * safe_divide(dot(q, lamp.axis_v), lamp.half_v))};
     }
     if (lamp.kind == LampKind::SUN) {
-        Vec3 to_sun = -outward, off = to_sun + lamp.direction;
-        float scale = 0.5f * safe_divide(1.0f, sqrt_f(2.0f * lamp.one_minus_cos_half_angle) * length(off));
-        float s = lamp.one_minus_cos_half_angle > 0.0f ? scale : 0.0f;
+        // The disk of directions: the radius is the chord from the axis, 1/2 at the sun's edge.
+        Vec3 to_sun = -outward;
+        float edge_chord = sqrt_f(2.0f * lamp.one_minus_cos_half_angle);
+        float s = safe_divide(1.0f, edge_chord * length(to_sun - lamp.direction));
         Vec3 local = lamp_local_direction(lamp, to_sun);
         return {local.x * s + 0.5f, local.y * s + 0.5f};
     }
