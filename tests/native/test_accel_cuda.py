@@ -111,7 +111,10 @@ def test_each_mapping_of_brute_force_gives_the_same_hits(place: str, kernel: str
     check_equal(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
 
 
-@pytest.mark.parametrize(("kind", "kernel"), [("BVH2_STACKLESS", "closest_together"), ("CWBVH", "closest_simple")])
+@pytest.mark.parametrize(
+    ("kind", "kernel"),
+    [("BVH2_STACKLESS", "closest_together"), ("CWBVH", "closest_simple"), ("KD_TREE", "closest_full")],
+)
 @pytest.mark.parametrize("name", ["soup", "needles", "identical"])
 def test_other_kernels_of_a_structure_give_the_same_hits(place: str, kind: Any, kernel: str, name: str) -> None:
     mesh = HARD_MESHES[name]
@@ -128,6 +131,15 @@ def test_empty_mesh_and_no_rays_are_answered(place: str, kind: Any) -> None:
     assert (ours.closest(random_rays(10))[1] == -1).all()
     assert not ours.any(random_rays(10)).any()
     assert len(Accel(*soup(5), kind=kind, device="CUDA").closest(np.zeros((0, 8), np.float32))[0]) == 0
+
+
+def test_kd_tree_starts_again_where_its_short_stack_ran_out(place: str) -> None:
+    mesh = HARD_MESHES["size 2^-i"]
+    rays = rows(np.zeros(3), np.random.default_rng(5).normal(size=(60, 3)))  # out of the deepest cell
+    ours, cpu = Accel(*mesh, kind="KD_TREE", device="CUDA"), Accel(*mesh, kind="KD_TREE")
+    check_equal(ours.closest(rays), cpu.closest(rays))
+    assert np.array_equal(ours.any(rays), cpu.any(rays))
+    assert ours.count(rays)["nodes"] > 1.2 * cpu.count(rays)["nodes"]  # 1.57: it did run out
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "CWBVH"])

@@ -31,5 +31,10 @@ __device__ __forceinline__ void trace_any(const View& view, const Primitives& al
 
 }  // namespace luch
 
+// LUCH_RESIDENT_BLOCKS: so many must fit on a multiprocessor at once, and ptxas spills a register rather than have fewer.
+#ifdef LUCH_RESIDENT_BLOCKS
+#define LUCH_KERNEL(name) extern "C" __global__ void __launch_bounds__(luch::RAY_BLOCK, LUCH_RESIDENT_BLOCKS) name
+#else
 #define LUCH_KERNEL(name) extern "C" __global__ void __launch_bounds__(luch::RAY_BLOCK) name
+#endif
 #define LUCH_ARGUMENTS const LUCH_VIEW view, const luch::Primitives all, const luch::RayBatch batch

@@ -22,7 +22,11 @@ from luch.cuda.structures import BLOCK
 BRUTE_RAYS = 1 << 17  # every primitive in turn: few rays, and one mesh
 BRUTE_MESH = "arcade"
 MAPPINGS = {"closest": 100, "closest_tiled": 130, "closest_reduced": "40-50"}  # the lecture's per cent
-OTHERS = {"BVH2_STACKLESS": {"together": "closest_together"}, "CWBVH": {"simple": "closest_simple"}}  # further kernels
+OTHERS = {  # further kernels of a structure
+    "BVH2_STACKLESS": {"together": "closest_together"},
+    "CWBVH": {"simple": "closest_simple"},
+    "KD_TREE": {"full stack": "closest_full"},
+}
 SLOWEST = 0.3  # s a launch; a structure that takes longer traces a part of the rays
 
 

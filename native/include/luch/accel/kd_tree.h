@@ -59,11 +59,15 @@ template <u32 COUNT>
 struct KdShortStack {
     static constexpr bool RESTARTS = true;
     static_assert((COUNT & (COUNT - 1)) == 0, "a ring of a power of two");
-    u32 top = 0, size = 0;
-    KdSpan ring[COUNT];
+    u32 size = 0, node[COUNT];
+    float t0[COUNT], t1[COUNT];
     u64 done = 0, waiting = 0;  // depths whose near child is done, whose far child waits
+    LUCH_FN u32 top() const { return u32(popcount(u32(waiting)) + popcount(u32(waiting >> 32))) & (COUNT - 1); }
     LUCH_FN void push(const KdSpan& s) {
-        ring[top++ & (COUNT - 1)] = s;
+        u32 k = top();
+        node[k] = s.node;
+        t0[k] = s.t0;
+        t1[k] = s.t1;
         size = size < COUNT ? size + 1 : COUNT;
         waiting |= s.path << 1;
     }
@@ -71,14 +75,15 @@ struct KdShortStack {
     LUCH_FN bool pop(const KdSpan& root, KdSpan* next) {
         if (waiting == 0) return false;
         u64 deepest = waiting & (0 - waiting);
-        waiting ^= deepest;
         done = (done | deepest) & (0 - deepest);  // what lies deeper begins anew
         if (size > 0) {
+            waiting ^= deepest;
             --size;
-            *next = ring[--top & (COUNT - 1)];
+            u32 k = top();
+            *next = {node[k], t0[k], t1[k], deepest >> 1};  // the last that was pushed is the deepest that waits
         } else {
-            *next = root;
             waiting = 0;
+            *next = root;
         }
         return true;
     }
