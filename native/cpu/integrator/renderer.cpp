@@ -64,7 +64,8 @@ void Renderer::build_all() {
     scene_.view.origin = {float(input_.origin[0]), float(input_.origin[1]), float(input_.origin[2])};
     scene_.view.flags = (input_.limits.caustics_reflective ? 0u : u32(SCENE_NO_REFLECTIVE_CAUSTICS)) |
                         (input_.limits.caustics_refractive ? 0u : u32(SCENE_NO_REFRACTIVE_CAUSTICS));
-    scene_.filter = input_.filter;
+    scene_.filter_table = input_.filter;
+    scene_.filter = &scene_.filter_table;
     scene_.limits = input_.limits;
     scene_.seed = input_.seed;
     scene_.log2_samples = ceil_log2(input_.samples);
@@ -72,7 +73,6 @@ void Renderer::build_all() {
     scene_.mist_start = input_.mist_start;
     scene_.mist_inverse_depth = input_.mist_depth > 0.0f ? 1.0f / input_.mist_depth : 0.0f;
     scene_.mist_exponent = input_.mist_exponent;
-    std::copy(input_.origin, input_.origin + 3, scene_.origin);
     find_constants();
     start = seconds_now();
     build_lights();
@@ -98,13 +98,16 @@ void Renderer::find_constants() {
     for (u32 m = 0; m < view.material_count; m++) {
         const Program& program = view.materials[m].program;
         registers = std::max(registers, size_t(program.register_count));
-        ConstantEmission emission;
+        ConstantEmission emission{};
         emission.constant = !(program.flags & PROGRAM_EMISSION) || (program.flags & PROGRAM_CONSTANT_EMISSION);
         if (program.flags & PROGRAM_CONSTANT_EMISSION) emission.radiance = evaluate_emission(view, program, points);
-        scene_.material_emission.push_back(emission);
+        scene_.emission_of_materials.push_back(emission);
     }
+    scene_.material_emission = scene_.emission_of_materials.data();
     for (const LampInput& lamp : input_.lamps) {
-        if (lamp.has_program) registers = std::max(registers, size_t(lamp.program.register_count));
+        if (!lamp.has_program) continue;
+        scene_.has_lamp_programs = true;
+        registers = std::max(registers, size_t(lamp.program.register_count));
     }
     scene_.max_registers = registers;
     scene_.has_world = input_.world.present;

@@ -18,4 +18,20 @@ struct Batch::Scratch {
     float light_u[3][SHADE_LANES], scatter_u[3][SHADE_LANES];
 };
 
+struct Batch::OnePoint {
+    Batch& batch;
+
+    const ClosureSet& light(const Program& program, const ShadePoints& points) {
+        run_program(batch.scene_.view, program, points, batch.scratch_->light_sets, batch.registers_.data(), nullptr, 0,
+                    Wanted::LIGHT);
+        return batch.scratch_->light_sets[0];
+    }
+    Hit closest(const Ray& ray) {
+        u32 kind = RAY_SHADOW;
+        Hit hit;
+        batch.scene_.accel->closest(&ray, &kind, &hit, 1);
+        return hit;
+    }
+};
+
 }  // namespace luch::cpu

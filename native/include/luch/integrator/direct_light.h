@@ -1,0 +1,170 @@
+// Next-event estimation: one light per shaded point, its emission, and the shadow ray.
+#pragma once
+#include "luch/integrator/scatter.h"
+
+namespace luch {
+
+// The shadow ray stops this fraction short of a sampled point, so that the light does not block itself: 84 ulp
+// of the distance, where the point on the light and the ray to it are each off by a few.
+inline constexpr float LIGHT_SHORTENING = 1e-5f;
+
+LUCH_FN Color only(BsdfValue& value, u32 visibility) {
+    if (!(visibility & RAY_DIFFUSE)) value.diffuse = make_vec3(0.0f);
+    if (!(visibility & RAY_GLOSSY)) value.glossy = make_vec3(0.0f);
+    if (!(visibility & RAY_TRANSMISSION)) value.transmission = make_vec3(0.0f);
+    return total(value);
+}
+
+// Blender's Max Bounces of a lamp or of the world, as Cycles hears it: it ends sampling, not seeing.
+LUCH_FN bool light_is_spent(const LightsView& lights, const LightSample& s, u32 bounce) {
+    if (s.kind == EmitterKind::LAMP) return bounce > lights.lamps[s.lamp].max_bounces;
+    return s.kind == EmitterKind::WORLD && bounce > lights.world.max_bounces;
+}
+
+// A light for the point, or false where none can reach it. u: two numbers for the place, one for the choice.
+LUCH_FN bool choose_light(const RenderView& scene, const PathState& path, const ShadePoints& points, int lane,
+                          const ClosureSet& set, Vec3 u, LightSample* s) {
+    if (set.count == 0 || !has_smooth_lobe(set)) return false;
+    *s = sample_light(scene.view, lane_position(points, lane), lane_normal(points, lane), set_transmits(set), u.z,
+                      {u.x, u.y});
+    if (s->kind == EmitterKind::NONE_ || !(s->pdf_sa > 0.0f)) return false;
+    return !light_is_spent(*scene.view.lights, *s, path.bounce);
+}
+
+LUCH_FN ConstantEmission emission_of(const RenderView& scene, const LightSample& s) {
+    if (s.kind == EmitterKind::LAMP) return {!scene.view.lights->lamps[s.lamp].has_program, {1.0f, 1.0f, 1.0f}};
+    if (s.kind == EmitterKind::WORLD) return scene.world_emission;
+    return scene.material_emission[material_at(scene.view, s.instance, s.prim)];
+}
+
+LUCH_FN const Program& program_of(const RenderView& scene, const LightSample& s) {
+    if (s.kind == EmitterKind::LAMP) return scene.view.lights->lamps[s.lamp].program;
+    if (s.kind == EmitterKind::WORLD) return scene.view.world_program;
+    return scene.view.materials[material_at(scene.view, s.instance, s.prim)].program;
+}
+
+// What the light's program reads at the sampled place. footprint: at the shaded point.
+LUCH_FN void setup_light_lane(const RenderView& scene, const PathState& path, u32 path_index, const LightSample& s,
+                              float footprint, ShadePoints& points, int lane) {
+    LaneInputs in;
+    in.point = s.kind == EmitterKind::WORLD ? s.direction : s.point;
+    in.to_viewer = -s.direction;
+    in.instance = s.instance, in.prim = s.prim;
+    in.u = s.u, in.v = s.v;
+    in.ray_length = finite_f(s.distance) ? s.distance : 0.0f;
+    in.footprint = footprint;
+    in.flags = (path.flags & 0xffffu & ~u32(PATH_CAMERA)) | PATH_EMISSION_ONLY;
+    in.depth = depth_word(path);
+    in.transparent_depth = path.transparent_bounce;
+    in.path = path_index;
+    in.seed = 0;
+    if (s.kind == EmitterKind::TRIANGLE) {
+        setup_surface_lane(scene.view, in, points, lane);
+        return;
+    }
+    in.prim = s.kind == EmitterKind::LAMP ? s.lamp : NONE;
+    setup_free_lane(in, s.kind == EmitterKind::LAMP ? s.normal : -s.direction, points, lane);
+}
+
+// The ray to the sampled light and what it brings; false where that is nothing. emission: of the light's program.
+LUCH_FN bool make_shadow_ray(const FilmLayout& layout, const PathState& path, u32 path_index, const ShadePoints& points,
+                             int lane, const ClosureSet& set, const SurfacePoint& spawn, const LightSample& s,
+                             Color emission, Ray* ray, ShadowRay* shadow) {
+    Color light = emission * s.radiance;
+    if (is_zero(light)) return false;
+    Vec3 ng = lane_face_normal(points, lane);
+    float bsdf_pdf = 0.0f;
+    BsdfValue value = eval_closures(set, ng, lane_to_viewer(points, lane), s.direction, &bsdf_pdf);
+    Color reflected = only(value, s.visibility);
+    if (is_zero(reflected)) return false;
+    float lobes = lobe_weight_sum(set);
+    bsdf_pdf *= lobes / (lobes + average(set.transparent));
+    float weight = (s.mis ? mis_weight(s.pdf_sa, bsdf_pdf) : 1.0f) / s.pdf_sa;
+    ray->origin = offset_origin(spawn, ng, s.direction);
+    ray->t_min = 0.0f;
+    ray->direction = s.direction;
+    ray->t_max = s.distance;
+    if (finite_f(s.distance)) {
+        // From the moved origin to the very point on the light, stopped short of it.
+        Vec3 to_light = s.point - ray->origin;
+        float distance = length(to_light);
+        if (!(distance > 0.0f)) return false;
+        ray->direction = to_light * (1.0f / distance);
+        ray->t_max = distance * (1.0f - LIGHT_SHORTENING);
+    }
+    shadow->contribution = path.throughput * reflected * light * weight;
+    shadow->pass_diffuse = path.pass_diffuse;
+    shadow->pass_glossy = path.pass_glossy;
+    if (layout.any_light_pass && !(path.flags & PATH_PASS_CHOSEN)) {
+        shadow->pass_diffuse = share(value.diffuse, reflected);
+        shadow->pass_glossy = share(value.glossy, reflected);
+    }
+    shadow->path = path_index;
+    shadow->bounce = path.bounce;
+    shadow->lightgroup = s.lightgroup;
+    shadow->for_ao = false;
+    shadow->casts = s.cast_shadow;
+    return true;
+}
+
+// The ray for the Ambient Occlusion pass.
+LUCH_FN void make_ao_ray(const RenderView& scene, const PathState& path, u32 path_index, const ShadePoints& points,
+                         int lane, const ClosureSet& set, const SurfacePoint& spawn, Ray* ray, ShadowRay* shadow) {
+    Vec3 n = shading_normal(set, lane_normal(points, lane));
+    Vec2 u = sample_2d(path.sampler, path.dimension + DIM_AO);
+    Vec3 t, b;
+    make_frame(n, &t, &b);
+    Vec3 direction = to_world(sample_cosine_hemisphere(u), t, b, n);
+    *ray = {offset_origin(spawn, lane_face_normal(points, lane), direction), 0.0f, direction, scene.limits.ao_distance};
+    *shadow = ShadowRay{};
+    shadow->contribution = path.throughput * (make_vec3(1.0f) - set.transparent);
+    shadow->path = path_index;
+    shadow->for_ao = true;
+    shadow->casts = true;
+}
+
+LUCH_FN bool wants_ao(const FilmLayout& layout, const PathState& path) {
+    return layout.ambient_occlusion != NONE && (path.flags & PATH_CAMERA);
+}
+
+// A shadow ray that met only surfaces that may be transparent: from one to the next, until it is dark.
+// tracer.closest(ray) gives a Hit; shader.light(program, points, lane) a point's ClosureSet of light alone.
+// *steps: surfaces looked through; *rays: traced.
+template <class Tracer, class Shader>
+LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& shadow, const PathState& path, Tracer& tracer,
+                               Shader& shader, ShadePoints& points, u64* steps, u64* rays) {
+    Color through = make_vec3(1.0f);
+    Ray ray = shadow;
+    for (u32 passed = path.transparent_bounce; passed <= scene.limits.transparent; passed++) {
+        Hit hit = tracer.closest(ray);
+        ++*rays;
+        if (hit.instance == NONE) return through;
+        if (passed == scene.limits.transparent) return make_vec3(0.0f);
+        const MaterialView& material = scene.view.materials[material_at(scene.view, hit.instance, hit.prim)];
+        if (!(material.program.flags & PROGRAM_TRANSPARENT) || !material.transparent_shadows) return make_vec3(0.0f);
+        ++*steps;
+        SurfacePoint spot = surface_point(scene.view, hit);
+        points.count = 1;
+        LaneInputs in;
+        in.point = spot.p;
+        in.to_viewer = -ray.direction;
+        in.instance = hit.instance, in.prim = hit.prim;
+        in.u = hit.u, in.v = hit.v;
+        in.ray_length = hit.t;
+        in.footprint = path.footprint;
+        in.flags = PATH_SHADOW | PATH_TRANSPARENT_ONLY;
+        in.depth = depth_word(path);
+        in.transparent_depth = passed;
+        in.path = 0, in.seed = 0;
+        setup_surface_lane(scene.view, in, points, 0);
+        through *= shader.light(material.program, points).transparent;
+        if (!(max_component(through) > 0.0f)) return make_vec3(0.0f);
+        Vec3 origin = offset_origin(spot, lane_face_normal(points, 0), ray.direction);
+        if (finite_f(ray.t_max)) ray.t_max -= dot(origin - ray.origin, ray.direction);
+        ray.origin = origin;
+        if (!(ray.t_max > 0.0f)) return through;
+    }
+    return make_vec3(0.0f);
+}
+
+}  // namespace luch

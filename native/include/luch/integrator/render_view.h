@@ -1,0 +1,55 @@
+// Everything that a path reads while it is traced: one scene, ready to render, as plain data. Filled by
+// cpu/integrator/renderer.cpp; nothing in it changes meanwhile.
+#pragma once
+#include "luch/camera/camera.h"
+#include "luch/film/film.h"
+#include "luch/film/filter.h"
+#include "luch/integrator/path.h"
+#include "luch/light/light.h"
+
+namespace luch {
+
+// Emission of a program that is the same everywhere, evaluated once.
+struct ConstantEmission {
+    bool constant;
+    Color radiance;
+};
+
+struct RenderView {
+    SceneView view;
+    CameraView camera;
+    const PixelFilter* filter;
+    const ConstantEmission* material_emission;  // per material
+    PathLimits limits;
+    u32 seed;
+    u32 log2_samples;         // the sampler leaves this much room for each pixel
+    bool halves;              // two independent sequences a pixel, kept apart in the film
+    bool has_lights;          // anything that sample_light could choose
+    bool has_visible_lamps;   // lamps of finite size that rays may meet
+    bool has_world;           // one that is not black
+    bool can_meet_light;      // a ray may come upon an emitter, a lamp or the world by itself
+    bool has_lamp_programs;   // some lamp has a node tree
+    u32 world_visibility, world_lightgroup;
+    ConstantEmission world_emission;
+    float mist_start, mist_inverse_depth, mist_exponent;
+};
+
+// Paths take notes for a denoiser until they meet something rough.
+LUCH_FN bool wants_features(const FilmLayout& layout) {
+    return layout.denoising_albedo != NONE || layout.denoising_normal != NONE;
+}
+
+// Bounces as Light Path's nodes read them from ShadePoints::depth.
+LUCH_FN u32 depth_word(const PathState& path) {
+    u32 bounce = path.bounce < 255u ? path.bounce : 255u;
+    return bounce | u32(path.diffuse_bounce) << 8 | u32(path.glossy_bounce) << 16 | u32(path.transmission_bounce) << 24;
+}
+
+// After its last bounce a path brings back nothing but light that it meets, unless the film or a denoiser's pass
+// waits for what lies behind.
+LUCH_FN bool looks_for_light_alone(const PathState& path) {
+    constexpr u32 more = u32(PATH_FEATURES) | u32(PATH_THROUGH_FILM);
+    return (path.flags & PATH_LAST_BOUNCE) && !(path.flags & more);
+}
+
+}  // namespace luch
