@@ -42,9 +42,11 @@ class PyRenderer {
         d["accelerator"] = s.accel_name;
         d["accelerator_reason"] = s.accel_reason;
         d["triangles"] = s.accel.triangles;
+        d["spheres"] = s.accel.spheres;
         d["structure_nodes"] = s.accel.nodes;
         d["structure_bytes"] = s.accel.bytes;
         d["dropped_triangles"] = s.accel.dropped_triangles;
+        d["dropped_spheres"] = s.accel.dropped_spheres;
         d["dropped_instances"] = dropped_instances_;
         d["structure_seconds"] = s.accel_seconds;
         d["lights_seconds"] = s.lights_seconds;

@@ -43,6 +43,7 @@ Domain read_domain(const std::string& name) {
     if (name == "CORNER") return Domain::CORNER;
     if (name == "FACE") return Domain::FACE;
     if (name == "MESH") return Domain::MESH;
+    if (name == "SPHERE") return Domain::SPHERE;
     if (name == "NONE") return Domain::NONE_;
     throw std::invalid_argument("Unknown attribute domain \"" + name + "\".");
 }
@@ -95,6 +96,13 @@ struct Reader {
         in.triangles = triangles.data();
         in.triangle_count = size_t(triangles.shape(0));
         in.material_slots = slots.data();
+        if (!mesh.attr("spheres").is_none()) {
+            auto spheres = keep.array<float>(mesh.attr("spheres"));
+            if (spheres.ndim() != 2 || spheres.shape(1) != 4)
+                throw std::invalid_argument("Mesh \"" + in.name + "\": spheres must be (S, 4): centre and radius.");
+            in.spheres = spheres.data();
+            in.sphere_count = size_t(spheres.shape(0));
+        }
         if (!mesh.attr("normals").is_none()) {
             auto normals = keep.array<float>(mesh.attr("normals"));
             in.normals_domain = read_domain(py::cast<std::string>(mesh.attr("normals_domain")));

@@ -22,6 +22,8 @@ size_t rows_of(Domain domain, const MeshInput& mesh) {
             return mesh.triangle_count;
         case Domain::MESH:
             return 1;
+        case Domain::SPHERE:
+            return mesh.sphere_count;
         case Domain::NONE_:
             return 0;
     }
@@ -35,6 +37,13 @@ void check_mesh(const MeshInput& mesh) {
                                         " names vertex " + std::to_string(mesh.triangles[i]) + " of " +
                                         std::to_string(mesh.vertex_count) + ". Export the mesh again.");
         }
+    }
+    for (size_t i = 0; i < mesh.sphere_count; i++) {
+        const float* s = mesh.spheres + 4 * i;
+        if (std::isfinite(s[0]) && std::isfinite(s[1]) && std::isfinite(s[2]) && std::isfinite(s[3]) && s[3] >= 0.0f)
+            continue;
+        throw std::invalid_argument("Mesh \"" + mesh.name + "\": sphere " + std::to_string(i) +
+                                    " needs a finite centre and a finite radius, not below 0. Export the mesh again.");
     }
     for (const AttributeInput& attribute : mesh.attributes) {
         if (attribute.rows != rows_of(attribute.domain, mesh) || attribute.channels < 1 || attribute.channels > 4) {
@@ -96,6 +105,8 @@ void SceneStore::add_mesh(const MeshInput& input) {
     mesh.vertex_count = u32(input.vertex_count);
     mesh.first_triangle = u32(triangles_.size() / 3);
     mesh.triangle_count = u32(input.triangle_count);
+    mesh.first_sphere = u32(spheres_.size() / 4);
+    mesh.sphere_count = u32(input.sphere_count);
     mesh.first_normal = u32(normals_.size() / 3);
     mesh.normals_domain = input.normals ? input.normals_domain : Domain::NONE_;
     mesh.texture_location = input.texture_location;
@@ -103,6 +114,7 @@ void SceneStore::add_mesh(const MeshInput& input) {
     positions_.insert(positions_.end(), input.positions, input.positions + input.vertex_count * 3);
     triangles_.insert(triangles_.end(), input.triangles, input.triangles + input.triangle_count * 3);
     material_slots_.insert(material_slots_.end(), input.material_slots, input.material_slots + input.triangle_count);
+    spheres_.insert(spheres_.end(), input.spheres, input.spheres + input.sphere_count * 4);
     if (input.normals) {
         normals_.insert(normals_.end(), input.normals, input.normals + rows_of(input.normals_domain, input) * 3);
     }
@@ -195,6 +207,7 @@ const SceneView& SceneStore::finish() {
     view_.positions = positions_.data();
     view_.triangles = triangles_.data();
     view_.material_slots = material_slots_.data();
+    view_.spheres = spheres_.data();
     view_.normals = normals_.data();
     view_.attribute_data = attribute_data_.data();
     view_.attributes = attributes_.data();
@@ -227,7 +240,8 @@ std::vector<std::vector<u8>> SceneStore::transparency_flags() const {
         if (!any) continue;
         const MeshView& mesh = meshes_[object.mesh];
         std::vector<u8>& out = flags[object.mesh];
-        out.resize(mesh.triangle_count);
+        out.resize(primitive_count(mesh));
+        for (u32 s = mesh.triangle_count; s < out.size(); s++) out[s] |= transparent[0];
         for (u32 t = 0; t < mesh.triangle_count; t++) {
             u16 slot = material_slots_[mesh.first_triangle + t];
             out[t] |= transparent[slot < transparent.size() ? slot : transparent.size() - 1];
@@ -237,8 +251,9 @@ std::vector<std::vector<u8>> SceneStore::transparency_flags() const {
 }
 
 size_t SceneStore::bytes() const {
-    size_t sum = (positions_.size() + normals_.size() + attribute_data_.size() + triangles_.size()) * 4 +
-                 material_slots_.size() * 2 + instances_.size() * sizeof(InstanceView);
+    size_t sum =
+        (positions_.size() + spheres_.size() + normals_.size() + attribute_data_.size() + triangles_.size()) * 4 +
+        material_slots_.size() * 2 + instances_.size() * sizeof(InstanceView);
     for (const std::vector<u8>& pixels : pixels_) sum += pixels.size();
     return sum;
 }

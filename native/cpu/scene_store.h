@@ -26,6 +26,8 @@ struct MeshInput {
     const u32* triangles;
     const u16* material_slots;
     size_t triangle_count;
+    const float* spheres;  // centre and radius, four each
+    size_t sphere_count;
     const float* normals;  // null: flat
     Domain normals_domain;
     std::vector<AttributeInput> attributes;
@@ -73,8 +75,8 @@ class SceneStore {
     SceneView& view() { return view_; }
     const SceneView& view() const { return view_; }
 
-    // Per mesh, per triangle: bit 0 set when some object that uses the mesh has a material there that may be
-    // transparent for shadow rays. An empty inner vector: no triangle of that mesh.
+    // Per mesh, per primitive: bit 0 set when some object that uses the mesh has a material there that may be
+    // transparent for shadow rays. An empty inner vector: no primitive of that mesh.
     std::vector<std::vector<u8>> transparency_flags() const;
 
     size_t bytes() const;
@@ -89,7 +91,7 @@ class SceneStore {
     };
     SceneView view_{};
     LinkedPrograms programs_;
-    std::vector<float> positions_, normals_, attribute_data_;
+    std::vector<float> positions_, spheres_, normals_, attribute_data_;
     std::vector<u32> triangles_, material_table_;
     std::vector<u16> material_slots_;
     std::vector<AttributeView> attributes_;

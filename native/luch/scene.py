@@ -27,12 +27,12 @@ class Attribute:
     """A named value on a mesh: float32 (n, channels 1..4), one row per element of its domain."""
 
     data: F32
-    domain: str  # "POINT" (V rows), "CORNER" (3T rows), "FACE" (T rows), "MESH" (1 row)
+    domain: str  # "POINT" (V rows), "CORNER" (3T rows), "FACE" (T rows), "MESH" (1 row), "SPHERE" (S rows)
 
 
 @dataclass
 class Mesh:
-    """Triangles in object space."""
+    """Triangles and spheres in object space. Sphere k is primitive T + k; all spheres show the first material."""
 
     name: str
     positions: F32  # (V, 3)
@@ -47,6 +47,8 @@ class Mesh:
     # "generated" (undeformed coordinates, already in 0..1) wins where it exists.
     texture_location: tuple[float, float, float] = (0.0, 0.0, 0.0)
     texture_size: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    # (S, 4) centre and radius, as point clouds have them: only their outside is seen. A radius of 0 is not drawn.
+    spheres: F32 | None = None
 
 
 @dataclass

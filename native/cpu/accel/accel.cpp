@@ -1,4 +1,4 @@
-// Two levels: groups of triangles, and entries that put a group into the world.
+// Two levels: groups of triangles or spheres, and entries that put a group into the world.
 #include "cpu/accel/accel.h"
 
 #include <algorithm>
@@ -86,6 +86,8 @@ class TwoLevel final : public Accel {
 
  private:
     void plan(const SceneView& scene, u64 flatten_triangles);
+    void add_to_world(const SceneView& scene, u32 instance);
+    void add_own_group(const SceneView& scene, u32 instance, const Member& primitives, u32* group);
     void add_entry(const SceneView& scene, u32 instance, u32 group);
     void build_groups(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
                       const AccelChoice& choice);
@@ -100,6 +102,12 @@ class TwoLevel final : public Accel {
     void closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const;
     u8 any_one(const Ray& ray, u32 kinds) const;
 
+    // A group of instances taken to the world.
+    struct FlatGroup {
+        u32 visibility, group;
+        u64 refs;
+    };
+    std::vector<FlatGroup> flat_;
     std::vector<Group> groups_;
     std::vector<Entry> entries_;
     HugeArray<Node8> top_;  // none: the entries are few, or this is brute force
@@ -112,7 +120,7 @@ TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& f
                    const AccelChoice& choice, u64 flatten_triangles) {
     auto start = std::chrono::steady_clock::now();
     if (!flags.empty() && flags.size() != scene.mesh_count)
-        throw std::invalid_argument("triangle_flags lists " + std::to_string(flags.size()) + " meshes, the scene has " +
+        throw std::invalid_argument("flags lists " + std::to_string(flags.size()) + " meshes, the scene has " +
                                     std::to_string(scene.mesh_count) + ".");
     plan(scene, flatten_triangles);
     build_groups(scene, flags, pool, choice);
@@ -125,40 +133,52 @@ TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& f
 // Lists groups and entries.
 void TwoLevel::plan(const SceneView& scene, u64 flatten_triangles) {
     std::vector<u8> flatten = meshes_to_flatten(scene, flatten_triangles);
-    std::vector<u32> group_of_mesh(scene.mesh_count, NONE);
-    std::vector<std::pair<u32, u32>> flat;  // visibility, group
-    std::vector<u64> flat_refs;             // of each such group
+    std::vector<u32> group_of_triangles(scene.mesh_count, NONE), group_of_spheres(scene.mesh_count, NONE);
     for (u32 i = 0; i < scene.instance_count; ++i) {
         const InstanceView& instance = scene.instances[i];
-        u32 triangles = scene.meshes[instance.mesh].triangle_count;
-        if (instance.visibility == 0 || triangles == 0) continue;
-        if (!flatten[instance.mesh]) {
-            u32& group = group_of_mesh[instance.mesh];
-            if (group == NONE) {
-                group = u32(groups_.size());
-                groups_.emplace_back().members = {{instance.mesh, NONE, 0}};
-            }
-            add_entry(scene, i, group);
-            continue;
-        }
-        size_t f = 0;
-        while (f < flat.size() && (flat[f].first != instance.visibility || flat_refs[f] + triangles > REF_MASK / 2))
-            ++f;
-        if (f == flat.size()) {
-            flat.push_back({instance.visibility, u32(groups_.size())});
-            flat_refs.push_back(0);
-            groups_.emplace_back();
-            entries_.push_back({{}, flat[f].second, NONE, instance.visibility});
-        }
-        groups_[flat[f].second].members.push_back({instance.mesh, i, u32(flat_refs[f])});
-        flat_refs[f] += triangles;
+        const MeshView& mesh = scene.meshes[instance.mesh];
+        if (instance.visibility == 0) continue;
+        if (mesh.triangle_count > 0 && flatten[instance.mesh])
+            add_to_world(scene, i);
+        else if (mesh.triangle_count > 0)
+            add_own_group(scene, i, {instance.mesh, NONE, 0, 0, mesh.triangle_count},
+                          &group_of_triangles[instance.mesh]);
+        if (mesh.sphere_count > 0)
+            add_own_group(scene, i, {instance.mesh, NONE, 0, mesh.triangle_count, mesh.sphere_count},
+                          &group_of_spheres[instance.mesh]);
     }
+}
+
+void TwoLevel::add_to_world(const SceneView& scene, u32 i) {
+    const InstanceView& instance = scene.instances[i];
+    u32 triangles = scene.meshes[instance.mesh].triangle_count;
+    auto found = std::find_if(flat_.begin(), flat_.end(), [&](const FlatGroup& flat) {
+        return flat.visibility == instance.visibility && flat.refs + triangles <= REF_MASK / 2;
+    });
+    if (found == flat_.end()) {
+        found = flat_.insert(found, {instance.visibility, u32(groups_.size()), 0});
+        groups_.emplace_back();
+        entries_.push_back({{}, found->group, NONE, instance.visibility});
+    }
+    groups_[found->group].members.push_back({instance.mesh, i, u32(found->refs), 0, triangles});
+    found->refs += triangles;
+}
+
+// The group of these primitives of a mesh, in the mesh's own space; made for the first instance that asks.
+void TwoLevel::add_own_group(const SceneView& scene, u32 i, const Member& primitives, u32* group) {
+    if (*group == NONE) {
+        *group = u32(groups_.size());
+        groups_.emplace_back().members = {primitives};
+        groups_.back().of_spheres = primitives.first_prim == scene.meshes[primitives.mesh].triangle_count;
+    }
+    add_entry(scene, i, *group);
 }
 
 void TwoLevel::add_entry(const SceneView& scene, u32 i, u32 group) {
     const InstanceView& instance = scene.instances[i];
     if (!is_finite(instance.to_world) || !is_finite(instance.to_object)) {
-        stats_.dropped_triangles += scene.meshes[instance.mesh].triangle_count;
+        (groups_[group].of_spheres ? stats_.dropped_spheres : stats_.dropped_triangles) +=
+            groups_[group].members[0].prim_count;
         return;
     }
     entries_.push_back({instance.to_object, group, i, instance.visibility});
@@ -169,7 +189,7 @@ void TwoLevel::build_groups(const SceneView& scene, const std::vector<std::vecto
     std::vector<u32> small;
     for (u32 g = 0; g < groups_.size(); ++g) {
         const Member& last = groups_[g].members.back();
-        if (last.first_ref + scene.meshes[last.mesh].triangle_count < SMALL_GROUP_REFS)
+        if (last.first_ref + last.prim_count < SMALL_GROUP_REFS)
             small.push_back(g);
         else
             build_group(groups_[g], scene, flags, choice, pool);
@@ -177,7 +197,7 @@ void TwoLevel::build_groups(const SceneView& scene, const std::vector<std::vecto
     pool.parallel_for(small.size(), 1, [&](size_t begin, size_t end, unsigned) {
         for (size_t i = begin; i < end; ++i) build_group(groups_[small[i]], scene, flags, choice, pool);
     });
-    std::erase_if(entries_, [this](const Entry& entry) { return groups_[entry.group].triangles == 0; });
+    std::erase_if(entries_, [this](const Entry& entry) { return groups_[entry.group].kept == 0; });
 }
 
 void TwoLevel::build_top(const SceneView& scene, ThreadPool& pool) {
@@ -218,12 +238,13 @@ void TwoLevel::count() {
     stats_.bytes += top_.bytes() + entries_.size() * sizeof(Entry);
     stats_.nodes += top_.size();
     for (const Group& group : groups_) {
-        stats_.triangles += group.triangles;
-        stats_.dropped_triangles += group.dropped;
+        (group.of_spheres ? stats_.spheres : stats_.triangles) += group.kept;
+        (group.of_spheres ? stats_.dropped_spheres : stats_.dropped_triangles) += group.dropped;
         stats_.nodes += group.nodes.size();
-        stats_.leaf_blocks += group.blocks.size();
-        stats_.bytes += group.nodes.bytes() + group.blocks.bytes() + group.members.size() * sizeof(Member);
-        stats_.bytes += group.corners.size() * sizeof(float) + group.flags.size();
+        stats_.leaf_blocks += group.blocks.size() + group.sphere_blocks.size();
+        stats_.bytes += group.nodes.bytes() + group.blocks.bytes() + group.sphere_blocks.bytes();
+        stats_.bytes += group.members.size() * sizeof(Member) + group.flags.size();
+        stats_.bytes += (group.corners.size() + group.spheres.size()) * sizeof(float);
         if (!group.structure) continue;
         StructureStats own = group.structure->stats();
         stats_.nodes += own.nodes;
@@ -256,7 +277,7 @@ void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) c
     closest_in_group(group, inside, max_f(ray.t_min, 0.0f), &hit);
     if (hit.ref == NONE) return;
     const Member& member = group.member_of(hit.ref);
-    u32 instance = entry.instance == NONE ? member.instance : entry.instance, prim = hit.ref - member.first_ref;
+    u32 instance = entry.instance == NONE ? member.instance : entry.instance, prim = member.prim_of(hit.ref);
     bool first_at_t = instance < best->instance || (instance == best->instance && prim < best->prim);
     if (hit.t < best->t || first_at_t) *best = {hit.t, prim, instance, hit.u, hit.v};
 }
@@ -302,7 +323,7 @@ u8 TwoLevel::any_one(const Ray& ray, u32 kinds) const {
 Hit TwoLevel::world_hit(const Group& group, const RefHit& hit) const {
     if (hit.ref == NONE) return MISS;
     const Member& member = group.member_of(hit.ref);
-    return {hit.t, hit.ref - member.first_ref, member.instance, hit.u, hit.v};
+    return {hit.t, member.prim_of(hit.ref), member.instance, hit.u, hit.v};
 }
 
 // All is one group in the world: its rays can be interleaved.
@@ -340,9 +361,9 @@ void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t co
 
 }  // namespace
 
-std::unique_ptr<Accel> Accel::build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
-                                    ThreadPool& pool, const AccelChoice& choice, u64 flatten_triangles) {
-    return std::make_unique<TwoLevel>(scene, triangle_flags, pool, choice, flatten_triangles);
+std::unique_ptr<Accel> Accel::build(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
+                                    const AccelChoice& choice, u64 flatten_triangles) {
+    return std::make_unique<TwoLevel>(scene, flags, pool, choice, flatten_triangles);
 }
 
 }  // namespace luch::cpu

@@ -1,4 +1,4 @@
-// The scene as rays see it: a BVH per mesh, a top level over instances. Hits do not depend on the
+// The scene as rays see it: a structure per mesh, a top level over instances. Hits do not depend on the
 // structure: the smallest t in (t_min, t_max]; on equal t the smaller (instance, prim).
 #pragma once
 #include <cstddef>
@@ -14,9 +14,11 @@ namespace luch::cpu {
 
 struct AccelStats {
     u64 triangles = 0;          // kept, counted once per mesh (once per instance where meshes are merged)
+    u64 spheres = 0;            // kept, once per mesh
     u64 nodes = 0, leaf_blocks = 0;
     u64 bytes = 0;              // nodes, leaf blocks and tables
     u64 dropped_triangles = 0;  // a vertex is not finite, its index lies outside the mesh, or there is no area
+    u64 dropped_spheres = 0;    // not finite, or of no size
     double build_seconds = 0.0;
 };
 
@@ -35,9 +37,9 @@ constexpr u64 FLATTEN_TRIANGLES = 2'000'000;
 
 class Accel {
  public:
-    // triangle_flags: per mesh, per triangle PrimitiveFlag bits; empty, or an empty list: all opaque.
+    // flags: per mesh, per primitive PrimitiveFlag bits; empty, or an empty list: all opaque.
     // The scene's arrays are copied: the view may go away afterwards, the instances too.
-    static std::unique_ptr<Accel> build(const SceneView& scene, const std::vector<std::vector<u8>>& triangle_flags,
+    static std::unique_ptr<Accel> build(const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                                         ThreadPool& pool, const AccelChoice& choice = {},
                                         u64 flatten_triangles = FLATTEN_TRIANGLES);
     virtual ~Accel() = default;
@@ -46,7 +48,7 @@ class Accel {
     // A ray with a non-finite origin or direction, a zero direction or a NaN interval misses.
     virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const = 0;
 
-    // blocked[i]: BLOCKED_OPAQUE if an opaque triangle lies in the interval, else BLOCKED_MAYBE if one that
+    // blocked[i]: BLOCKED_OPAQUE if an opaque primitive lies in the interval, else BLOCKED_MAYBE if one that
     // may be transparent does (walk them with closest), else BLOCKED_NOT.
     virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const = 0;
 

@@ -1,4 +1,4 @@
-// Gathering a group's triangles, and its tree.
+// Gathering a group's primitives, and its tree.
 #include <algorithm>
 #include <atomic>
 #include <stdexcept>
@@ -11,13 +11,17 @@
 namespace luch::cpu {
 namespace {
 
-constexpr size_t GATHER_CHUNK = 16384;  // triangles
+constexpr size_t GATHER_CHUNK = 16384;  // primitives
+
+constexpr u32 TRIANGLES_A_BLOCK = 4, SPHERES_A_BLOCK = 8;
+
+u32 leaf_width(const Group& group) { return group.of_spheres ? SPHERES_A_BLOCK : TRIANGLES_A_BLOCK; }
 
 struct Corners3 {
     Vec3 p[3];
 };
 
-// Reads triangles by ref, in the group's space.
+// Reads primitives by ref, in the group's space.
 class Gather {
  public:
     Gather(const Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags)
@@ -25,12 +29,12 @@ class Gather {
 
     u32 ref_count() const {
         const Member& last = group_.members.back();
-        return last.first_ref + scene_.meshes[last.mesh].triangle_count;
+        return last.first_ref + last.prim_count;
     }
     // False for a triangle that cannot be traced: an index outside the mesh, a vertex that is not finite, no area.
     bool read(u32 ref, const Member& member, Corners3* out) const {
         const MeshView& mesh = scene_.meshes[member.mesh];
-        const u32* indices = scene_.triangles + 3 * (size_t(mesh.first_triangle) + ref - member.first_ref);
+        const u32* indices = scene_.triangles + 3 * (size_t(mesh.first_triangle) + member.prim_of(ref));
         for (int k = 0; k < 3; ++k) {
             if (indices[k] >= mesh.vertex_count) return false;
             const float* p = scene_.positions + 3 * (size_t(mesh.first_vertex) + indices[k]);
@@ -40,9 +44,27 @@ class Gather {
         }
         return triangle_can_be_traced(out->p[0], out->p[1], out->p[2]);
     }
+    // False for a sphere that is not finite or has no size.
+    bool read(u32 ref, const Member& member, Sphere* out) const {
+        const float* s = sphere_at(scene_, scene_.meshes[member.mesh], member.prim_of(ref));
+        *out = {{s[0], s[1], s[2]}, abs_f(s[3])};
+        return sphere_can_be_traced(*out);
+    }
+    bool read_box(u32 ref, const Member& member, Box* out) const {
+        if (group_.of_spheres) {
+            Sphere s;
+            if (!read(ref, member, &s)) return false;
+            *out = sphere_box(s.center, s.radius);
+            return true;
+        }
+        Corners3 c;
+        if (!read(ref, member, &c)) return false;
+        *out = triangle_box(c.p[0], c.p[1], c.p[2]);
+        return true;
+    }
     u32 flagged(u32 ref, const Member& member) const {
         if (flags_.empty() || flags_[member.mesh].empty()) return ref;
-        u8 flag = flags_[member.mesh][ref - member.first_ref];
+        u8 flag = flags_[member.mesh][member.prim_of(ref)];
         return flag & PRIMITIVE_MAY_BE_TRANSPARENT ? ref | REF_TRANSPARENT : ref;
     }
 
@@ -52,7 +74,7 @@ class Gather {
     const std::vector<std::vector<u8>>& flags_;
 };
 
-// The boxes of the triangles kept, in order of ref.
+// The boxes of the primitives kept, in order of ref.
 HugeArray<PrimBox> gather_boxes(const Group& group, const Gather& gather, ThreadPool& pool, size_t* kept) {
     size_t refs = gather.ref_count();
     HugeArray<PrimBox> boxes(refs);
@@ -63,9 +85,8 @@ HugeArray<PrimBox> gather_boxes(const Group& group, const Gather& gather, Thread
         const Member* last = &group.members.back();
         for (size_t ref = begin; ref < end; ++ref) {
             while (member != last && ref >= member[1].first_ref) ++member;
-            Corners3 c;
-            if (!gather.read(u32(ref), *member, &c)) continue;
-            Box b = triangle_box(c.p[0], c.p[1], c.p[2]);
+            Box b;
+            if (!gather.read_box(u32(ref), *member, &b)) continue;
             boxes[next++] = {{-b.lo.x, -b.lo.y, -b.lo.z}, u32(ref), {b.hi.x, b.hi.y, b.hi.z}, 0};
         }
         filled[begin / GATHER_CHUNK] = next - begin;
@@ -97,8 +118,24 @@ void fill_block(Block4& block, const u32* refs, u32 count, const Group& group, c
     }
 }
 
+void fill_block(SphereBlock& block, const u32* refs, u32 count, const Group& group, const Gather& gather) {
+    for (u32 lane = 0; lane < SPHERES_A_BLOCK; ++lane) {
+        Sphere s = {make_vec3(0.0f), 0.0f};
+        u32 ref = REF_MASK;
+        if (lane < count) {
+            const Member& member = group.member_of(refs[lane]);
+            gather.read(refs[lane], member, &s);
+            ref = gather.flagged(refs[lane], member);
+        }
+        for (int axis = 0; axis < 3; ++axis) block.center[axis][lane] = s.center[axis];
+        block.radius[lane] = s.radius;
+        block.ref[lane] = ref;
+    }
+}
+
 // Turns the builder's leaves (ranges of order) into blocks.
 void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gather, ThreadPool& pool) {
+    const u32 width = leaf_width(group);
     std::vector<u32> first_order;  // per block
     first_order.reserve(order.size() / 3 + 1);
     std::vector<u8> size;
@@ -108,33 +145,46 @@ void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gath
         for (int slot = 0; slot < 8; ++slot) {
             u32 count = node.count[slot], first = node.child[slot];
             if (count == 0) continue;
-            u32 blocks = (count + 3) / 4, block = u32(first_order.size());
+            u32 blocks = (count + width - 1) / width, block = u32(first_order.size());
             if (block + blocks > LEAF_FIRST_MASK)
-                throw std::length_error("More than a billion triangles in one mesh or scene.");
+                throw std::length_error("More than a billion primitives in one mesh or scene.");
             node.child[slot] = LEAF | ((blocks - 1) << LEAF_COUNT_SHIFT) | block;
             for (u32 b = 0; b < blocks; ++b) {
-                first_order.push_back(first + 4 * b);
-                size.push_back(u8(std::min(4u, count - 4 * b)));
+                first_order.push_back(first + width * b);
+                size.push_back(u8(std::min(width, count - width * b)));
             }
         }
     }
-    group.blocks = HugeArray<Block4>(first_order.size());
-    pool.parallel_for(first_order.size(), GATHER_CHUNK / 4, [&](size_t begin, size_t end, unsigned) {
-        for (size_t b = begin; b < end; ++b)
-            fill_block(group.blocks[b], &order[first_order[b]], size[b], group, gather);
-    });
+    auto fill = [&](auto& blocks) {
+        blocks = std::remove_reference_t<decltype(blocks)>(first_order.size());
+        pool.parallel_for(first_order.size(), GATHER_CHUNK / width, [&](size_t begin, size_t end, unsigned) {
+            for (size_t b = begin; b < end; ++b) fill_block(blocks[b], &order[first_order[b]], size[b], group, gather);
+        });
+    };
+    if (group.of_spheres)
+        fill(group.sphere_blocks);
+    else
+        fill(group.blocks);
 }
 
-// The triangles kept, side by side in order of ref: what builders take.
+// The primitives kept, side by side in order of ref: what builders take.
 StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, BuildQuality quality,
                        std::vector<u32>* refs_kept, ThreadPool& pool) {
     u32 ref_count = gather.ref_count();
-    group.corners.assign(9 * size_t(ref_count), 0.0f);
+    group.corners.assign(group.of_spheres ? 0 : 9 * size_t(ref_count), 0.0f);
+    group.spheres.assign(group.of_spheres ? 4 * size_t(ref_count) : 0, 0.0f);
     std::vector<u32>& refs = *refs_kept;
     refs.resize(kept);
     pool.parallel_for(kept, GATHER_CHUNK, [&](size_t begin, size_t end, unsigned) {
         for (size_t i = begin; i < end; ++i) {
             u32 ref = refs[i] = boxes[i].id;
+            if (group.of_spheres) {
+                Sphere s;
+                gather.read(ref, group.member_of(ref), &s);
+                s.radius = -s.radius;  // its outside alone
+                std::copy_n(&s.center.x, 4, group.spheres.data() + 4 * size_t(ref));
+                continue;
+            }
             Corners3 c;
             gather.read(ref, group.member_of(ref), &c);
             std::copy_n(&c.p[0].x, 9, group.corners.data() + 9 * size_t(ref));
@@ -145,7 +195,9 @@ StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Ga
         group.flags.resize(ref_count);
         group.flags[ref] = PRIMITIVE_MAY_BE_TRANSPARENT;
     }
-    Primitives all = {group.corners.data(), nullptr, group.flags.empty() ? nullptr : group.flags.data(), ref_count, 0};
+    u32 triangle_count = group.of_spheres ? 0 : ref_count;
+    Primitives all = {group.corners.data(), group.spheres.data(), group.flags.empty() ? nullptr : group.flags.data(),
+                      triangle_count, ref_count - triangle_count};
     return {all, refs.data(), u32(kept), quality};
 }
 
@@ -161,8 +213,10 @@ Tree8 collapse_tree(Group& group, const PrimBox* boxes, size_t kept, const Gathe
                     ThreadPool& pool) {
     std::vector<u32> refs;
     StructureInput input = collect(group, boxes, kept, gather, choice.quality, &refs, pool);
-    Tree8 tree = collapse_bvh8(build_tree2(input, 4, pool), 4, pool);
+    const u32 width = leaf_width(group);
+    Tree8 tree = collapse_bvh8(build_tree2(input, width, pool), width, pool);
     group.corners = {};
+    group.spheres = {};
     group.flags = {};
     return tree;
 }
@@ -180,7 +234,7 @@ void build_group(Group& group, const SceneView& scene, const std::vector<std::ve
     Gather gather(group, scene, flags);
     size_t kept = 0;
     HugeArray<PrimBox> boxes = gather_boxes(group, gather, pool, &kept);
-    group.triangles = kept;
+    group.kept = kept;
     group.dropped = gather.ref_count() - kept;
     group.root = empty_box();
     if (kept == 0) return;
@@ -192,7 +246,7 @@ void build_group(Group& group, const SceneView& scene, const std::vector<std::ve
         return make_structure(group, boxes.data(), kept, gather, choice, pool);
     }
     Tree8 tree = choice.quality == BuildQuality::NORMAL
-                     ? build_bvh8(std::move(boxes), kept, 4, pool)
+                     ? build_bvh8(std::move(boxes), kept, leaf_width(group), pool)
                      : collapse_tree(group, boxes.data(), kept, gather, choice, pool);
     group.nodes = std::move(tree.nodes);
     group.root = tree.root;

@@ -12,7 +12,7 @@
 namespace luch::cpu {
 
 // A child is an inner node's index, or LEAF | (items - 1) << LEAF_COUNT_SHIFT | first item; an empty slot
-// has a box that no ray enters. Items are blocks of four triangles, or instances in the top level.
+// has a box that no ray enters. Items are blocks of four triangles or eight spheres, or instances in the top level.
 constexpr u32 LEAF = 0x80000000u;
 constexpr u32 LEAF_COUNT_SHIFT = 28;
 constexpr u32 LEAF_MAX_ITEMS = 8;
@@ -40,6 +40,14 @@ struct alignas(32) Block4 {
     u32 ref[4];
 };
 static_assert(sizeof(Block4) == 160);
+
+// Eight spheres. Empty lanes have radius 0, which is never hit.
+struct alignas(32) SphereBlock {
+    float center[3][8];
+    float radius[8];  // positive
+    u32 ref[8];
+};
+static_assert(sizeof(SphereBlock) == 160);
 
 // An array that asks for huge pages: incoherent rays then miss the TLB less.
 template <class T>

@@ -29,7 +29,7 @@ constexpr const char* PRECISIONS[] = {"FAST", "WATERTIGHT", "DOUBLE"};
 
 // AUTO tries a structure only where building it is cheap beside any render: the wide tree won every race over larger
 // scenes (docs/rays.md), so there the attempt would cost more than it could bring.
-constexpr u64 TRY_BRUTE_FORCE_BELOW = 64;    // triangles
+constexpr u64 TRY_BRUTE_FORCE_BELOW = 64;    // primitives
 constexpr u64 TRY_KD_TREE_BELOW = 20'000;
 constexpr u32 TRIAL_RAYS = 2048;
 // A challenger must win by this much: trials scatter by a few percent.
@@ -43,8 +43,15 @@ double seconds_now() {
 Vec3 point_on_scene(const SceneView& scene, u32 number) {
     const InstanceView& instance = scene.instances[hash_u32(number, 0) % scene.instance_count];
     const MeshView& mesh = scene.meshes[instance.mesh];
-    if (mesh.triangle_count == 0) return make_vec3(0.0f);
-    size_t triangle = mesh.first_triangle + hash_u32(number, 1) % mesh.triangle_count;
+    if (primitive_count(mesh) == 0) return make_vec3(0.0f);
+    u32 prim = hash_u32(number, 1) % primitive_count(mesh);
+    if (is_sphere(mesh, prim)) {
+        const float* s = sphere_at(scene, mesh, prim);
+        float up = 2.0f * unit_float(hash_u32(number, 2)) - 1.0f;
+        Vec3 side = {sqrt_f(1.0f - up * up), 0.0f, up};
+        return transform_point(instance.to_world, vec3_of(s) + side * s[3]);
+    }
+    size_t triangle = mesh.first_triangle + prim;
     float share = 0.5f * unit_float(hash_u32(number, 2));
     const float weight[3] = {share, 0.5f - share, 0.5f};
     Vec3 sum = make_vec3(0.0f);
@@ -78,9 +85,9 @@ double measure(const Accel& accel, const std::vector<Ray>& rays) {
     return double(rays.size()) / std::max(best, 1e-9) * 1e-6;
 }
 
-u64 triangles_of(const SceneView& scene) {
+u64 primitives_of(const SceneView& scene) {
     u64 count = 0;
-    for (u32 i = 0; i < scene.instance_count; ++i) count += scene.meshes[scene.instances[i].mesh].triangle_count;
+    for (u32 i = 0; i < scene.instance_count; ++i) count += primitive_count(scene.meshes[scene.instances[i].mesh]);
     return count;
 }
 
@@ -127,12 +134,12 @@ ChosenAccel build_chosen(const SceneView& scene, const std::vector<std::vector<u
         chosen.reason = "chosen by the user";
         return chosen;
     }
-    u64 triangles = triangles_of(scene);
+    u64 primitives = primitives_of(scene);
     std::vector<StructureKind> challengers;
-    if (triangles < TRY_BRUTE_FORCE_BELOW) challengers.push_back(StructureKind::BRUTE_FORCE);
-    if (triangles < TRY_KD_TREE_BELOW) challengers.push_back(StructureKind::KD_TREE);
-    if (challengers.empty() || triangles == 0) {
-        chosen.reason = triangles ? "the fastest in all races over scenes of this size" : "nothing to hit";
+    if (primitives < TRY_BRUTE_FORCE_BELOW) challengers.push_back(StructureKind::BRUTE_FORCE);
+    if (primitives < TRY_KD_TREE_BELOW) challengers.push_back(StructureKind::KD_TREE);
+    if (challengers.empty() || primitives == 0) {
+        chosen.reason = primitives ? "the fastest in all races over scenes of this size" : "nothing to hit";
         return chosen;
     }
     std::vector<Ray> rays = trial_rays(scene);

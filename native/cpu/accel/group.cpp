@@ -3,6 +3,7 @@
 
 #include "cpu/accel/accel.h"
 #include "cpu/accel/leaf.h"
+#include "cpu/accel/sphere_blocks.h"
 #include "cpu/accel/traverse.h"
 
 namespace luch::cpu {
@@ -33,19 +34,27 @@ u8 any_in_tree(const Group& group, const LaneRay& ray, float t_min, float t_max)
     return result;
 }
 
+// Calls act with the type of the ray that the group's leaves take.
+template <class Act>
+auto with_block_ray(const Group& group, Act&& act) {
+    if (group.of_spheres) {
+        if (group.precision == Precision::FAST) return act.template operator()<SphereBlockRay<Precision::FAST>>();
+        return act.template operator()<SphereBlockRay<Precision::WATERTIGHT>>();  // double already
+    }
+    if (group.precision == Precision::FAST) return act.template operator()<FastBlockRay>();
+    if (group.precision == Precision::DOUBLE) return act.template operator()<DoubleBlockRay>();
+    return act.template operator()<BlockRay>();
+}
+
 }  // namespace
 
 void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* best) {
     if (group.structure) {
         Ray inside = {ray.origin3(), t_min, ray.direction3(), best->t};
         group.structure->closest(group.precision, &inside, best, 1, nullptr);
-    } else if (group.precision == Precision::WATERTIGHT) {
-        closest_in_tree<BlockRay>(group, ray, t_min, best);
-    } else if (group.precision == Precision::FAST) {
-        closest_in_tree<FastBlockRay>(group, ray, t_min, best);
-    } else {
-        closest_in_tree<DoubleBlockRay>(group, ray, t_min, best);
+        return;
     }
+    with_block_ray(group, [&]<class Block>() { closest_in_tree<Block>(group, ray, t_min, best); });
 }
 
 u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max) {
@@ -55,9 +64,7 @@ u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max
         group.structure->any(group.precision, &inside, &result, 1, nullptr);
         return result;
     }
-    if (group.precision == Precision::FAST) return any_in_tree<FastBlockRay>(group, ray, t_min, t_max);
-    if (group.precision == Precision::DOUBLE) return any_in_tree<DoubleBlockRay>(group, ray, t_min, t_max);
-    return any_in_tree<BlockRay>(group, ray, t_min, t_max);
+    return with_block_ray(group, [&]<class Block>() { return any_in_tree<Block>(group, ray, t_min, t_max); });
 }
 
 }  // namespace luch::cpu

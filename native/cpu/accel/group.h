@@ -1,5 +1,6 @@
-// A group: the triangles of one mesh in its own space, or of several instances taken to the world. It has
-// one tree. A triangle's ref is its member's first_ref + its index in the mesh, so refs sort as
+// A group: the triangles of one mesh in its own space, or of several instances taken to the world; or the spheres of
+// one mesh in its own space (an instance may stretch them, so they are never taken to the world). It has one tree.
+// A ref is its member's first_ref + how far the primitive comes after the member's first, so refs sort as
 // (instance, prim) do.
 #pragma once
 #include <vector>
@@ -18,23 +19,29 @@ struct Member {
     u32 mesh;
     u32 instance;  // NONE: the mesh in its own space
     u32 first_ref;
+    u32 first_prim, prim_count;  // of the mesh
+
+    u32 prim_of(u32 ref) const { return ref - first_ref + first_prim; }
 };
 
 struct Group {
     std::vector<Member> members;  // by instance
+    bool of_spheres = false;      // else of triangles
     Precision precision = Precision::WATERTIGHT;
     HugeArray<Node8> nodes;       // the wide tree; none: structure holds the group
     HugeArray<Block4> blocks;
+    HugeArray<SphereBlock> sphere_blocks;
     std::unique_ptr<Structure> structure;
     std::vector<float> corners;   // of structure's triangles: nine floats a ref
+    std::vector<float> spheres;   // of structure's spheres: four floats a ref
     std::vector<u8> flags;        // PrimitiveFlag by ref; empty: none
     Box root;
-    u64 triangles = 0, dropped = 0;
+    u64 kept = 0, dropped = 0;    // primitives
 
     const Member& member_of(u32 ref) const;
 };
 
-// Fills everything but members, which say what to gather. flags: per mesh, per triangle PrimitiveFlag.
+// Fills everything but members and of_spheres, which say what to gather. flags: per mesh, per primitive PrimitiveFlag.
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                  const AccelChoice& choice, ThreadPool& pool);
 

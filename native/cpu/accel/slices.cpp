@@ -40,13 +40,14 @@ void Clipper::cut(const PrimBox& ref, int axis, const float* planes, int count, 
         error = CUT_ERROR * max_f(whole[0] + whole[4], max_f(whole[1] + whole[5], whole[2] + whole[6]));
     } else {
         const float* s = all_.spheres + 4 * u64(ref.id - all_.triangle_count);
-        f8 whole = united(point(s) + s[3], point(s) - s[3]);
+        const float radius = abs_f(s[3]);
+        f8 whole = united(point(s) + radius, point(s) - radius);
         for (int i = 0; i <= count; ++i) {
             out[i] = whole;
             if (i > 0) out[i][axis] = min_f(whole[axis], -planes[i - 1]);
             if (i < count) out[i][axis + 4] = min_f(whole[axis + 4], planes[i]);
         }
-        error = CUT_ERROR * s[3];
+        error = CUT_ERROR * radius;
     }
     f8 before = load_box(ref);
     for (int i = 0; i <= count; ++i) {

@@ -66,7 +66,7 @@ void Batch::setup_chunk(const u32* queue, int count, ShadePoints& points) {
     for (int lane = 0; lane < count; lane++) {
         u32 k = queue[lane];
         SurfacePoint& spawn = scratch_->spawn[lane];
-        spawn = surface_point(scene_.view, hits_[k]);
+        spawn = surface_point(scene_.view, hits_[k], rays_[k]);
         setup_surface_lane(scene_.view,
                            surface_inputs(paths_[ray_path_[k]], ray_path_[k], hits_[k], spawn, rays_[k].direction),
                            points, lane);

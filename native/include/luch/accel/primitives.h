@@ -13,7 +13,7 @@ namespace luch {
 
 struct Primitives {
     const float* corners;  // nine floats a triangle: p0, p1, p2; by ref
-    const float* spheres;  // four floats a sphere: centre, radius; by ref - triangle_count
+    const float* spheres;  // four floats a sphere: centre, radius (see Sphere); by ref - triangle_count
     const u8* flags;       // PrimitiveFlag by ref; null: none
     u32 triangle_count, sphere_count;
 };
@@ -103,9 +103,7 @@ LUCH_FN Box primitive_box(const Primitives& all, u32 ref) {
         return triangle_box(vec3_of(p), vec3_of(p + 3), vec3_of(p + 6));
     }
     const float* s = all.spheres + 4 * u64(ref - all.triangle_count);
-    Vec3 c = vec3_of(s), r = make_vec3(s[3] + SHEAR_ERROR * s[3]);
-    return {{below(c.x - r.x), below(c.y - r.y), below(c.z - r.z)},
-            {above(c.x + r.x), above(c.y + r.y), above(c.z + r.z)}};
+    return sphere_box(vec3_of(s), s[3]);
 }
 
 LUCH_FN bool is_closer(float t, u32 ref, const RefHit& best) { return t < best.t || (t == best.t && ref < best.ref); }

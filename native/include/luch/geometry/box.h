@@ -28,6 +28,14 @@ LUCH_FN Box triangle_box(Vec3 p0, Vec3 p1, Vec3 p2) {
             {above(hi.x + error), above(hi.y + error), above(hi.z + error)}};
 }
 
+// As wide as the ray's cone strays at the ball's size; where along the ray the test's t is exact.
+LUCH_FN Box sphere_box(Vec3 center, float radius) {
+    float r = abs_f(radius);
+    r += SHEAR_ERROR * r;
+    return {{below(center.x - r), below(center.y - r), below(center.z - r)},
+            {above(center.x + r), above(center.y + r), above(center.z + r)}};
+}
+
 // Per axis: the slab interval is (near plane - near_origin) near_rdir .. (far plane - far_origin) far_rdir.
 struct BoxRay {
     float near_origin[3], far_origin[3];

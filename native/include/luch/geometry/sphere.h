@@ -9,6 +9,8 @@
 
 namespace luch {
 
+// A radius below zero: a ball of that size of which only the outside is there. A ray that starts within leaves
+// unseen, as through Blender's point clouds (Cycles drops their back faces).
 struct Sphere {
     Vec3 center;
     float radius;
@@ -18,13 +20,14 @@ LUCH_FN float root_of(float x) { return __builtin_sqrtf(x); }
 LUCH_FN double root_of(double x) { return __builtin_sqrt(x); }
 
 LUCH_FN bool sphere_can_be_traced(const Sphere& sphere) {  // NaN: no
-    return point_can_be_traced(sphere.center) && sphere.radius > 0.0f && sphere.radius <= LARGEST_COORDINATE;
+    float radius = abs_f(sphere.radius);
+    return point_can_be_traced(sphere.center) && radius > 0.0f && radius <= LARGEST_COORDINATE;
 }
 
 // Both distances along the ray, near then far, in F; false if the line misses or the sphere has no size.
 template <class F>
 LUCH_FN bool sphere_distances(Vec3 origin, Vec3 direction, const Sphere& sphere, F* near_t, F* far_t) {
-    F dx = F(direction.x), dy = F(direction.y), dz = F(direction.z), r = F(sphere.radius);
+    F dx = F(direction.x), dy = F(direction.y), dz = F(direction.z), r = F(abs_f(sphere.radius));
     F fx = F(origin.x) - F(sphere.center.x), fy = F(origin.y) - F(sphere.center.y),
       fz = F(origin.z) - F(sphere.center.z);
     F a = dx * dx + dy * dy + dz * dz;
@@ -42,7 +45,8 @@ LUCH_FN bool sphere_distances(Vec3 origin, Vec3 direction, const Sphere& sphere,
     return true;
 }
 
-// The nearest hit in (t_min, t_max]: the far side counts too, from inside. t alone; a sphere has no u, v.
+// The nearest hit in (t_min, t_max]: the far side counts too, from inside, where the radius is positive. t alone; a
+// sphere has no u, v.
 template <Precision P>
 LUCH_FN bool intersect_sphere(Vec3 origin, Vec3 direction, const Sphere& sphere, float t_min, float t_max, float* t) {
     float roots[2];
@@ -54,9 +58,10 @@ LUCH_FN bool intersect_sphere(Vec3 origin, Vec3 direction, const Sphere& sphere,
         roots[0] = float(near_t);
         roots[1] = float(far_t);
     }
-    for (float root : roots)
-        if (root > t_min && root <= t_max) {  // NaN: miss
-            *t = root;
+    const int sides = sphere.radius < 0.0f ? 1 : 2;
+    for (int side = 0; side < sides; ++side)
+        if (roots[side] > t_min && roots[side] <= t_max) {  // NaN: miss
+            *t = roots[side];
             return true;
         }
     return false;

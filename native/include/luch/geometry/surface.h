@@ -1,6 +1,7 @@
 // The point that a hit names, how far off it may be, and where the next ray starts.
 #pragma once
 #include "luch/geometry/ray.h"
+#include "luch/geometry/sphere.h"
 #include "luch/math/bounds.h"
 #include "luch/math/vec.h"
 #include "luch/shade/scene_view.h"
@@ -10,6 +11,8 @@ namespace luch {
 // p is within error, axis by axis, of the surface as any later ray will meet it (math/bounds.h, 2).
 struct SurfacePoint {
     Vec3 p, error;  // world
+    Vec3 outward;   // of a sphere: its unit normal, away from the inside; zero: a triangle
+    Vec3 radial;    // of a sphere: unit, from the centre to p. An instance may stretch it: then they differ
 };
 
 LUCH_FN Vec3 transform_magnitude(const Affine& a, Vec3 magnitude) {
@@ -19,6 +22,32 @@ LUCH_FN Vec3 transform_magnitude(const Affine& a, Vec3 magnitude) {
 }
 LUCH_FN Vec3 translation_magnitude(const Affine& a) { return {abs_f(a.m[3]), abs_f(a.m[7]), abs_f(a.m[11])}; }
 
+// A point of object space, with the error and the extent of what it lies on (math/bounds.h, 2), taken to the world.
+LUCH_FN SurfacePoint instance_point(Vec3 object, Vec3 object_error, float extent, const Affine& to_world,
+                                    const Affine& to_object) {
+    Vec3 world = transform_point(to_world, object);
+    Vec3 back = transform_magnitude(to_object, abs_v(world)) + translation_magnitude(to_object);
+    // A flattened instance has no inverse: it is traced in the world, and no ray goes back.
+    if (finite_v(back)) object_error += gamma_f(4) * back;
+    Vec3 forward = transform_magnitude(to_world, abs_v(object) + make_vec3(extent)) + translation_magnitude(to_world);
+    return {world, transform_magnitude(to_world, object_error) + gamma_f(8) * forward, {}, {}};
+}
+
+// The unit vector from a sphere's centre to where a ray of its space enters it (or comes nearest, where the test's
+// rounding saw a hit). In double: a sphere may be tiny beside its distance from the ray's origin.
+LUCH_FN Vec3 entered_at(const Sphere& sphere, Vec3 origin, Vec3 direction) {
+    double dx = double(direction.x), dy = double(direction.y), dz = double(direction.z);
+    double fx = double(origin.x) - double(sphere.center.x), fy = double(origin.y) - double(sphere.center.y),
+           fz = double(origin.z) - double(sphere.center.z);
+    double a = dx * dx + dy * dy + dz * dz, r = double(abs_f(sphere.radius));
+    double s = -(fx * dx + fy * dy + fz * dz) / a;
+    double px = fx + s * dx, py = fy + s * dy, pz = fz + s * dz;  // the line's point nearest to the centre
+    double inside = r * r - (px * px + py * py + pz * pz);
+    double back = inside > 0 ? root_of(inside / a) : 0;
+    Vec3 n = {float((px - back * dx) / r), float((py - back * dy) / r), float((pz - back * dz) / r)};
+    return normalize_or(n, -normalize(direction));
+}
+
 // The point (1 - u - v) p0 + u p1 + v p2 of an object-space triangle.
 LUCH_FN SurfacePoint triangle_point(Vec3 p0, Vec3 p1, Vec3 p2, float u, float v, const Affine& to_world,
                                     const Affine& to_object) {
@@ -27,18 +56,30 @@ LUCH_FN SurfacePoint triangle_point(Vec3 p0, Vec3 p1, Vec3 p2, float u, float v,
     Vec3 object = a + b + c;
     float extent = max_component(max_v(max_v(abs_v(p0 - object), abs_v(p1 - object)), abs_v(p2 - object)));
     Vec3 object_error = gamma_f(7) * (abs_v(a) + abs_v(b) + abs_v(c)) + make_vec3(gamma_f(7) * extent);
-
-    Vec3 world = transform_point(to_world, object);
-    Vec3 back = transform_magnitude(to_object, abs_v(world)) + translation_magnitude(to_object);
-    // A flattened instance has no inverse: it is traced in the world, and no ray goes back.
-    if (finite_v(back)) object_error += gamma_f(4) * back;
-    Vec3 forward = transform_magnitude(to_world, abs_v(object) + make_vec3(extent)) + translation_magnitude(to_world);
-    return {world, transform_magnitude(to_world, object_error) + gamma_f(8) * forward};
+    return instance_point(object, object_error, extent, to_world, to_object);
 }
 
-LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit) {
+// Where a ray enters a sphere of an instance, from the ray's own line: t would bring the digits of the distance.
+LUCH_FN SurfacePoint sphere_point(const Sphere& sphere, const Ray& ray, const Affine& to_world,
+                                  const Affine& to_object) {
+    Vec3 n = entered_at(sphere, transform_point(to_object, ray.origin), transform_direction(to_object, ray.direction));
+    float radius = abs_f(sphere.radius);
+    Vec3 object_error = gamma_f(6) * (abs_v(sphere.center) + make_vec3(radius));
+    SurfacePoint point = instance_point(sphere.center + n * radius, object_error, radius, to_world, to_object);
+    point.radial = normalize_or(transform_direction(to_world, n), n);
+    point.outward = normalize_or(transform_direction_transposed(to_object, n), n);
+    return point;
+}
+
+// ray: the one that found the hit, world.
+LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit, const Ray& ray) {
     const InstanceView& instance = scene.instances[hit.instance];
-    Triangle t = triangle_at(scene, scene.meshes[instance.mesh], hit.prim);
+    const MeshView& mesh = scene.meshes[instance.mesh];
+    if (is_sphere(mesh, hit.prim)) {
+        const float* s = sphere_at(scene, mesh, hit.prim);
+        return sphere_point({{s[0], s[1], s[2]}, s[3]}, ray, instance.to_world, instance.to_object);
+    }
+    Triangle t = triangle_at(scene, mesh, hit.prim);
     return triangle_point(t.p[0], t.p[1], t.p[2], hit.u, hit.v, instance.to_world, instance.to_object);
 }
 
@@ -56,7 +97,7 @@ LUCH_FN Vec3 offset_origin(Vec3 p, Vec3 error, Vec3 n_geometric, Vec3 direction)
 }
 
 LUCH_FN Vec3 offset_origin(const SurfacePoint& point, Vec3 n_geometric, Vec3 direction) {
-    return offset_origin(point.p, point.error, n_geometric, direction);
+    return offset_origin(point.p, point.error, is_zero(point.outward) ? n_geometric : point.outward, direction);
 }
 
 }  // namespace luch

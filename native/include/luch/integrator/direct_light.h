@@ -47,6 +47,7 @@ LUCH_FN const Program& program_of(const RenderView& scene, const LightSample& s)
 LUCH_FN void setup_light_lane(const RenderView& scene, const PathState& path, u32 path_index, const LightSample& s,
                               float footprint, ShadePoints& points, int lane) {
     LaneInputs in;
+    in.radial = make_vec3(0.0f);  // spheres are no lights
     in.point = s.kind == EmitterKind::WORLD ? s.direction : s.point;
     in.to_viewer = -s.direction;
     in.instance = s.instance, in.prim = s.prim;
@@ -143,10 +144,10 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& shadow, const
         const MaterialView& material = scene.view.materials[material_at(scene.view, hit.instance, hit.prim)];
         if (!(material.program.flags & PROGRAM_TRANSPARENT) || !material.transparent_shadows) return make_vec3(0.0f);
         ++*steps;
-        SurfacePoint spot = surface_point(scene.view, hit);
+        SurfacePoint spot = surface_point(scene.view, hit, ray);
         points.count = 1;
         LaneInputs in;
-        in.point = spot.p;
+        in.point = spot.p, in.radial = spot.radial;
         in.to_viewer = -ray.direction;
         in.instance = hit.instance, in.prim = hit.prim;
         in.u = hit.u, in.v = hit.v;

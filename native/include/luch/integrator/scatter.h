@@ -25,7 +25,7 @@ LUCH_FN bool survives(const RenderView& scene, PathState& path, const MaterialVi
 LUCH_FN LaneInputs surface_inputs(const PathState& path, u32 path_index, const Hit& hit, const SurfacePoint& at,
                                   Vec3 direction) {
     LaneInputs in;
-    in.point = at.p;
+    in.point = at.p, in.radial = at.radial;
     in.to_viewer = -direction;
     in.instance = hit.instance, in.prim = hit.prim;
     in.u = hit.u, in.v = hit.v;

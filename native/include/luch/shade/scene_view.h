@@ -6,7 +6,7 @@
 
 namespace luch {
 
-enum class Domain : u8 { NONE_, POINT, CORNER, FACE, MESH };
+enum class Domain : u8 { NONE_, POINT, CORNER, FACE, MESH, SPHERE };
 
 struct AttributeView {
     u32 offset;   // into SceneView::attribute_data, floats
@@ -21,6 +21,7 @@ struct MeshView {
     Domain normals_domain;               // NONE_: flat
     u32 first_attribute;                 // attributes[first_attribute + attribute id]
     Vec3 texture_location, texture_size;
+    u32 first_sphere, sphere_count;      // into spheres; sphere k is primitive triangle_count + k
 };
 
 enum InstanceFlag : u32 { INSTANCE_HOLDOUT = 1u, INSTANCE_SHADOW_CATCHER = 2u, INSTANCE_MIRRORED = 4u };
@@ -73,7 +74,8 @@ enum SceneFlag : u32 { SCENE_NO_REFLECTIVE_CAUSTICS = 1u, SCENE_NO_REFRACTIVE_CA
 struct SceneView {
     const float* positions;      // 3 per vertex, object space
     const u32* triangles;        // 3 per triangle, local vertex indices
-    const u16* material_slots;   // per triangle
+    const u16* material_slots;   // per triangle; spheres show the first slot
+    const float* spheres;        // 4 per sphere: centre, radius, object space; only its outside is seen
     const float* normals;
     const float* attribute_data;
     const AttributeView* attributes;
@@ -113,6 +115,13 @@ LUCH_FN const u32* corners_of(const SceneView& scene, const MeshView& mesh, u32 
     return scene.triangles + 3 * (u64(mesh.first_triangle) + prim);
 }
 
+LUCH_FN u32 primitive_count(const MeshView& mesh) { return mesh.triangle_count + mesh.sphere_count; }
+LUCH_FN bool is_sphere(const MeshView& mesh, u32 prim) { return prim >= mesh.triangle_count; }
+// Centre and radius of a primitive that is a sphere.
+LUCH_FN const float* sphere_at(const SceneView& scene, const MeshView& mesh, u32 prim) {
+    return scene.spheres + 4 * (u64(mesh.first_sphere) + (prim - mesh.triangle_count));
+}
+
 struct Triangle {
     Vec3 p[3];  // object space
 };
@@ -128,7 +137,9 @@ LUCH_FN u32 material_of_slot(const SceneView& scene, const InstanceView& instanc
 }
 LUCH_FN u32 material_at(const SceneView& scene, u32 instance_index, u32 prim) {
     const InstanceView& instance = scene.instances[instance_index];
-    return material_of_slot(scene, instance, scene.material_slots[scene.meshes[instance.mesh].first_triangle + prim]);
+    const MeshView& mesh = scene.meshes[instance.mesh];
+    return material_of_slot(scene, instance,
+                            is_sphere(mesh, prim) ? 0u : scene.material_slots[mesh.first_triangle + prim]);
 }
 
 LUCH_FN const float* table_of(const OpContext& c, u32 offset) {

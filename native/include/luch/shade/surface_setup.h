@@ -26,19 +26,25 @@ LUCH_FN Vec3 world_smooth_normal(const SceneView& scene, const MeshView& mesh, c
 
 struct LaneInputs {
     Vec3 point, to_viewer;  // world; to_viewer unit
+    Vec3 radial;            // of a point on a sphere: SurfacePoint::radial, its normal as shaders see it
     u32 instance, prim;
     float u, v;
     float ray_length, footprint;
     u32 flags, depth, transparent_depth, path, seed;
 };
 
-// Fills lane `lane` for a point on a triangle. Normals are turned to the viewer's side and
+// Fills lane `lane` for a point on a triangle or sphere. Normals are turned to the viewer's side and
 // PATH_BACKFACING is set when that turned them.
 LUCH_FN void setup_surface_lane(const SceneView& scene, const LaneInputs& in, ShadePoints& points, int lane) {
     const InstanceView& instance = scene.instances[in.instance];
     const MeshView& mesh = scene.meshes[instance.mesh];
-    Vec3 ng = world_face_normal(instance, triangle_at(scene, mesh, in.prim));
-    Vec3 n = world_smooth_normal(scene, mesh, instance, in.prim, in.u, in.v, ng);
+    Vec3 ng, n;
+    if (is_sphere(mesh, in.prim)) {
+        ng = n = in.radial;
+    } else {
+        ng = world_face_normal(instance, triangle_at(scene, mesh, in.prim));
+        n = world_smooth_normal(scene, mesh, instance, in.prim, in.u, in.v, ng);
+    }
     bool back = dot(ng, in.to_viewer) < 0.0f;
     if (back) {
         ng = -ng;

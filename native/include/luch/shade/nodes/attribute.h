@@ -50,7 +50,9 @@ LUCH_FN Vec2 barycentrics_at(const OpContext& c, const u32* params) {
     Vec2 uv = {c.points->u[c.lane], c.points->v[c.lane]};
     if (params[0] == 0) return uv;
     const InstanceView& instance = c.scene->instances[c.points->instance[c.lane]];
-    Triangle t = triangle_at(*c.scene, c.scene->meshes[instance.mesh], c.points->prim[c.lane]);
+    const MeshView& mesh = c.scene->meshes[instance.mesh];
+    if (is_sphere(mesh, c.points->prim[c.lane])) return uv;
+    Triangle t = triangle_at(*c.scene, mesh, c.points->prim[c.lane]);
     Vec3 edge_u = transform_direction(instance.to_world, t.p[1] - t.p[0]);
     Vec3 edge_v = transform_direction(instance.to_world, t.p[2] - t.p[0]);
     // Seen from behind, Cycles turns both edges round: attributes step the other way than places do.
@@ -74,9 +76,14 @@ LUCH_FN AttributeValue read_attribute(const OpContext& c, u32 attribute, const u
     if (view.channels == 0) return result;
     const float* data = scene.attribute_data + view.offset;
     const u32 prim = c.points->prim[c.lane], n = view.channels;
-    if (view.domain == Domain::FACE || view.domain == Domain::MESH) {
-        const float* row = data + (view.domain == Domain::FACE ? u64(prim) * n : 0u);
-        for (u32 k = 0; k < n; k++) result.value[k] = row[k];
+    const bool sphere = is_sphere(mesh, prim);
+    if (view.domain != Domain::MESH && sphere != (view.domain == Domain::SPHERE)) {
+        result.channels = 0;  // the attribute is the mesh's other primitives'
+        return result;
+    }
+    if (sphere || view.domain == Domain::FACE || view.domain == Domain::MESH) {
+        u32 index = view.domain == Domain::MESH ? 0u : (sphere ? prim - mesh.triangle_count : prim);
+        for (u32 k = 0; k < n; k++) result.value[k] = data[u64(index) * n + k];
         return result;
     }
     u32 index[3] = {3 * prim, 3 * prim + 1, 3 * prim + 2};

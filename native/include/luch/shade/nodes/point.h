@@ -4,6 +4,7 @@
 #include "luch/camera/camera.h"
 #include "luch/light/light.h"
 #include "luch/shade/nodes/attribute.h"
+#include "luch/shade/textures/hash.h"
 
 namespace luch {
 
@@ -171,6 +172,20 @@ LUCH_POINT_OP(OpObjectRandom, 1, 0, {
     out[0] = i ? i->random : (lamp ? lamp->random : 0.0f);
 });
 
+// Point Info; out: centre in Blender's world, radius there, random number. Zero where the point is on no sphere.
+LUCH_POINT_OP(OpPointInfo, 5, 0, {
+    for (int k = 0; k < 5; k++) out[k] = 0.0f;
+    const InstanceView* i = instance_at(c);
+    const u32 prim = c.points->prim[c.lane];
+    if (!i || !is_sphere(c.scene->meshes[i->mesh], prim)) return;
+    const MeshView& mesh = c.scene->meshes[i->mesh];
+    const float* s = sphere_at(*c.scene, mesh, prim);
+    store_vec3(out, transform_point(i->to_world, load_vec3(s)) + c.scene->origin);
+    // A stretched one has many radii: this is the one towards (1, 1, 1), as Blender has it.
+    out[3] = length(transform_direction(i->to_world, make_vec3(s[3] * 0.57735027f)));
+    out[4] = float(hash_words(prim - mesh.triangle_count, 0u)) * (1.0f / 4294967295.0f);
+});
+
 // params[0]: bits of PathFlag, any of which gives 1.
 LUCH_POINT_OP(OpLightPathFlag, 1, 1, { out[0] = (c.points->flags[c.lane] & params[0]) ? 1.0f : 0.0f; });
 LUCH_POINT_OP(OpLightPathLength, 1, 0, { out[0] = c.points->ray_length[c.lane]; });
@@ -208,7 +223,9 @@ struct OpWireframe {
         out[0] = 0.0f;
         const InstanceView* instance = instance_at(c);
         if (!instance) return;
-        Triangle t = triangle_at(*c.scene, c.scene->meshes[instance->mesh], c.points->prim[c.lane]);
+        const MeshView& mesh = c.scene->meshes[instance->mesh];
+        if (is_sphere(mesh, c.points->prim[c.lane])) return;
+        Triangle t = triangle_at(*c.scene, mesh, c.points->prim[c.lane]);
         float width = 1.0f;
         if (params[2] != 0) {  // seen across the ray
             Stencil s = stencil_at(c);
