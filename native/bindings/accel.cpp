@@ -2,9 +2,11 @@
 #include <pybind11/numpy.h>
 
 #include <algorithm>
+#include <mutex>
 #include <vector>
 
 #include "bindings/bind.h"
+#include "bindings/counts.h"
 #include "cpu/accel/accel.h"
 #include "luch/geometry/surface.h"
 
@@ -103,6 +105,28 @@ class ArrayAccel {
         return blocked;
     }
 
+    // The work of rays (N, 8), all together: nodes, boxes, primitives, bytes.
+    py::dict count(const FloatArray& rays, bool any_hit) {
+        const Ray* in = reinterpret_cast<const Ray*>(rays.data());
+        Counters total;
+        {
+            std::mutex lock;
+            py::gil_scoped_release release;
+            pool_.parallel_for(size_t(rays.shape(0)), RAYS_PER_CHUNK, [&](size_t begin, size_t end, unsigned) {
+                std::vector<Hit> hits(end - begin);
+                std::vector<u8> blocked(end - begin);
+                Counters kept;
+                if (any_hit)
+                    accel_->any(in + begin, nullptr, blocked.data(), end - begin, &kept);
+                else
+                    accel_->closest(in + begin, nullptr, hits.data(), end - begin, &kept);
+                std::lock_guard guard(lock);
+                total.add(kept);
+            });
+        }
+        return counts(total);
+    }
+
     py::dict stats() const {
         cpu::AccelStats s = accel_->stats();
         py::dict out;
@@ -143,6 +167,7 @@ void bind_accel(py::module_& m) {
                       const FloatArray&, const FloatArray&, const IndexArray&, int, u32, u32, unsigned, u64>())
         .def("closest", &ArrayAccel::closest)
         .def("any", &ArrayAccel::any)
+        .def("count", &ArrayAccel::count)
         .def("stats", &ArrayAccel::stats);
     m.def("spawn_rays", &spawn_rays, "Rays off triangles by their error bound, for tests of the bound.");
 }

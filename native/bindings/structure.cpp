@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bindings/bind.h"
+#include "bindings/counts.h"
 
 namespace luch::bindings {
 namespace {
@@ -123,14 +124,6 @@ class ArrayStructure {
         }
         return triangle_can_be_traced(vec3_of(corners), vec3_of(corners + 3), vec3_of(corners + 6));
     }
-    static py::dict counts(const Counters& total) {
-        py::dict out;
-        out["nodes"] = total.nodes;
-        out["boxes"] = total.boxes;
-        out["primitives"] = total.primitives;
-        out["bytes"] = total.bytes;
-        return out;
-    }
     template <class Run, class Miss>
     void trace(const FloatArray& rays, bool counted, Counters* total, Run&& run, Miss&& miss) {
         const Ray* in = reinterpret_cast<const Ray*>(rays.data());
@@ -151,10 +144,7 @@ class ArrayStructure {
             Counters kept;
             run(begin, valid, at, counted ? &kept : nullptr);
             std::lock_guard guard(lock);
-            total->nodes += kept.nodes;
-            total->boxes += kept.boxes;
-            total->primitives += kept.primitives;
-            total->bytes += kept.bytes;
+            total->add(kept);
         });
     }
 

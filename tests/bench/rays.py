@@ -110,7 +110,7 @@ def trace_all(kind: str, rays: Any, built: list[Any], rows: list[Row], rounds: i
     for i, (row, accel) in enumerate(zip(rows, built, strict=True)):
         first = hits[0] if len(hits[i]) == len(hits[0]) else hits[0][::step]
         row[f"{kind}_differ"] = int((hits[i] != first).sum())
-        if isinstance(accel, Accel) and accel.kind != "BVH":
+        if isinstance(accel, Accel):
             counts = accel.count(taste, any_hit=kind == "shadow")
             row[f"{kind}_nodes"], row[f"{kind}_tests"] = (counts[k] / len(taste) for k in ("nodes", "primitives"))
 

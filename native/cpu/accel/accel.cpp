@@ -80,8 +80,8 @@ class TwoLevel final : public Accel {
  public:
     TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
              const AccelChoice& choice, u64 flatten_triangles);
-    void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const override;
-    void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const override;
+    void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count, Counters* counters) const override;
+    void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count, Counters* counters) const override;
     AccelStats stats() const override { return stats_; }
 
  private:
@@ -95,12 +95,16 @@ class TwoLevel final : public Accel {
     void count();
     NodeRay top_ray(Vec3 origin, Vec3 direction, float t_min) const;
     bool enter(const Entry& entry, const Ray& ray, LaneRay* out) const;
-    void closest_in_entry(const Entry& entry, const Ray& ray, Hit* hit) const;
-    u8 any_in_entry(const Entry& entry, const Ray& ray) const;
-    Hit closest_one(const Ray& ray, u32 kinds) const;
+    template <class Count>
+    void closest_in_entry(const Entry& entry, const Ray& ray, Hit* hit, Count& count) const;
+    template <class Count>
+    u8 any_in_entry(const Entry& entry, const Ray& ray, Count& count) const;
+    template <class Count>
+    Hit closest_one(const Ray& ray, u32 kinds, Count& count) const;
     Hit world_hit(const Group& group, const RefHit& hit) const;
     void closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const;
-    u8 any_one(const Ray& ray, u32 kinds) const;
+    template <class Count>
+    u8 any_one(const Ray& ray, u32 kinds, Count& count) const;
 
     // A group of instances taken to the world.
     struct FlatGroup {
@@ -269,12 +273,13 @@ bool TwoLevel::enter(const Entry& entry, const Ray& ray, LaneRay* out) const {
     return ray_is_valid(inside);
 }
 
-void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) const {
+template <class Count>
+void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best, Count& count) const {
     LaneRay inside;
     if (!enter(entry, ray, &inside)) return;
     const Group& group = groups_[entry.group];
     RefHit hit = {best->t, NONE, 0.0f, 0.0f};
-    closest_in_group(group, inside, max_f(ray.t_min, 0.0f), &hit);
+    closest_in_group(group, inside, max_f(ray.t_min, 0.0f), &hit, count);
     if (hit.ref == NONE) return;
     const Member& member = group.member_of(hit.ref);
     u32 instance = entry.instance == NONE ? member.instance : entry.instance, prim = member.prim_of(hit.ref);
@@ -282,39 +287,44 @@ void TwoLevel::closest_in_entry(const Entry& entry, const Ray& ray, Hit* best) c
     if (hit.t < best->t || first_at_t) *best = {hit.t, prim, instance, hit.u, hit.v};
 }
 
-u8 TwoLevel::any_in_entry(const Entry& entry, const Ray& ray) const {
+template <class Count>
+u8 TwoLevel::any_in_entry(const Entry& entry, const Ray& ray, Count& count) const {
     LaneRay inside;
     if (!enter(entry, ray, &inside)) return BLOCKED_NOT;
-    return any_in_group(groups_[entry.group], inside, max_f(ray.t_min, 0.0f), min_f(ray.t_max, LARGEST));
+    return any_in_group(groups_[entry.group], inside, max_f(ray.t_min, 0.0f), min_f(ray.t_max, LARGEST), count);
 }
 
-Hit TwoLevel::closest_one(const Ray& ray, u32 kinds) const {
+template <class Count>
+Hit TwoLevel::closest_one(const Ray& ray, u32 kinds, Count& count) const {
     if (!ray_is_valid(ray)) return MISS;
     Hit best = {min_f(ray.t_max, LARGEST), NONE, NONE, 0.0f, 0.0f};
-    auto visit = [&](u32 first, u32 count) {
-        for (u32 e = first; e < first + count; ++e)
-            if (entries_[e].visibility & kinds) closest_in_entry(entries_[e], ray, &best);
+    auto visit = [&](u32 first, u32 size) {
+        for (u32 e = first; e < first + size; ++e)
+            if (entries_[e].visibility & kinds) closest_in_entry(entries_[e], ray, &best, count);
     };
     auto visit_leaf = [&](u32 leaf) { visit(leaf_first(leaf), leaf_items(leaf)); };
     if (top_.size())
-        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), &best.t, visit_leaf);
+        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), &best.t, visit_leaf,
+                      count);
     else
         visit(0, u32(entries_.size()));
     return best.prim == NONE ? MISS : best;
 }
 
-u8 TwoLevel::any_one(const Ray& ray, u32 kinds) const {
+template <class Count>
+u8 TwoLevel::any_one(const Ray& ray, u32 kinds, Count& count) const {
     if (!ray_is_valid(ray)) return BLOCKED_NOT;
     u8 result = BLOCKED_NOT;
-    auto visit = [&](u32 first, u32 count) {
-        for (u32 e = first; e < first + count && result != BLOCKED_OPAQUE; ++e)
+    auto visit = [&](u32 first, u32 size) {
+        for (u32 e = first; e < first + size && result != BLOCKED_OPAQUE; ++e)
             if (entries_[e].visibility & kinds)
-                if (u8 blocked = any_in_entry(entries_[e], ray)) result = blocked;
+                if (u8 blocked = any_in_entry(entries_[e], ray, count)) result = blocked;
         return result == BLOCKED_OPAQUE;
     };
     auto visit_leaf = [&](u32 leaf) { return visit(leaf_first(leaf), leaf_items(leaf)); };
     if (top_.size())
-        visit_any(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), ray.t_max, visit_leaf);
+        visit_any(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), ray.t_max, visit_leaf,
+                  count);
     else
         visit(0, u32(entries_.size()));
     return result;
@@ -340,7 +350,13 @@ void TwoLevel::closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hit
     for (u32 i = 0; i < count; ++i) hits[i] = world_hit(group, found[i]);
 }
 
-void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const {
+void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count, Counters* counters) const {
+    auto kinds_of = [&](size_t i) { return ray_kinds ? ray_kinds[i] : u32(RAY_ALL); };
+    if (counters) {
+        for (size_t i = 0; i < count; ++i) hits[i] = closest_one(rays[i], kinds_of(i), *counters);
+        return;
+    }
+    NoCounters none;
     const Group* one = entries_.size() == 1 && entries_[0].instance == NONE ? &groups_[entries_[0].group] : nullptr;
     for (size_t first = 0; first < count; first += BATCH) {
         u32 size = u32(std::min<size_t>(BATCH, count - first));
@@ -350,13 +366,19 @@ void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t 
             closest_scattered(rays + first, kinds, hits + first, size);
             continue;
         }
-        for (size_t i = first; i < first + size; ++i)
-            hits[i] = closest_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL));
+        for (size_t i = first; i < first + size; ++i) hits[i] = closest_one(rays[i], kinds_of(i), none);
     }
 }
 
-void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const {
-    for (size_t i = 0; i < count; ++i) blocked[i] = any_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL));
+void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count, Counters* counters) const {
+    auto each = [&](auto& kept) {
+        for (size_t i = 0; i < count; ++i) blocked[i] = any_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL), kept);
+    };
+    NoCounters none;
+    if (counters)
+        each(*counters);
+    else
+        each(none);
 }
 
 }  // namespace

@@ -16,21 +16,25 @@ struct Rays {
     Rays(const Group& group, const LaneRay& ray, float t_min) : node(ray, group.root, t_min), block(ray, t_min) {}
 };
 
-template <class Block>
-void closest_in_tree(const Group& group, const LaneRay& ray, float t_min, RefHit* best) {
+template <class Block, class Count>
+void closest_in_tree(const Group& group, const LaneRay& ray, float t_min, RefHit* best, Count& count) {
     Rays<Block> rays(group, ray, t_min);
-    visit_closest(group.nodes.data(), rays.node, &best->t,
-                  [&](u32 leaf) { closest_in_leaf(group, rays.block, leaf, best); });
+    visit_closest(
+        group.nodes.data(), rays.node, &best->t,
+        [&](u32 leaf) { closest_in_leaf(group, rays.block, leaf, best, count); }, count);
 }
 
-template <class Block>
-u8 any_in_tree(const Group& group, const LaneRay& ray, float t_min, float t_max) {
+template <class Block, class Count>
+u8 any_in_tree(const Group& group, const LaneRay& ray, float t_min, float t_max, Count& count) {
     u8 result = BLOCKED_NOT;
     Rays<Block> rays(group, ray, t_min);
-    visit_any(group.nodes.data(), rays.node, t_max, [&](u32 leaf) {
-        any_in_leaf(group, rays.block, leaf, t_max, &result);
-        return result == BLOCKED_OPAQUE;
-    });
+    visit_any(
+        group.nodes.data(), rays.node, t_max,
+        [&](u32 leaf) {
+            any_in_leaf(group, rays.block, leaf, t_max, &result, count);
+            return result == BLOCKED_OPAQUE;
+        },
+        count);
     return result;
 }
 
@@ -46,25 +50,34 @@ auto with_block_ray(const Group& group, Act&& act) {
     return act.template operator()<BlockRay>();
 }
 
+inline Counters* pointer_to(Counters& count) { return &count; }
+inline Counters* pointer_to(NoCounters&) { return nullptr; }
+
 }  // namespace
 
-void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* best) {
+template <class Count>
+void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* best, Count& count) {
     if (group.structure) {
         Ray inside = {ray.origin3(), t_min, ray.direction3(), best->t};
-        group.structure->closest(group.precision, &inside, best, 1, nullptr);
+        group.structure->closest(group.precision, &inside, best, 1, pointer_to(count));
         return;
     }
-    with_block_ray(group, [&]<class Block>() { closest_in_tree<Block>(group, ray, t_min, best); });
+    with_block_ray(group, [&]<class Block>() { closest_in_tree<Block>(group, ray, t_min, best, count); });
 }
+template void closest_in_group(const Group&, const LaneRay&, float, RefHit*, NoCounters&);
+template void closest_in_group(const Group&, const LaneRay&, float, RefHit*, Counters&);
 
-u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max) {
+template <class Count>
+u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max, Count& count) {
     if (group.structure) {
         Ray inside = {ray.origin3(), t_min, ray.direction3(), t_max};
         u8 result = BLOCKED_NOT;
-        group.structure->any(group.precision, &inside, &result, 1, nullptr);
+        group.structure->any(group.precision, &inside, &result, 1, pointer_to(count));
         return result;
     }
-    return with_block_ray(group, [&]<class Block>() { return any_in_tree<Block>(group, ray, t_min, t_max); });
+    return with_block_ray(group, [&]<class Block>() { return any_in_tree<Block>(group, ray, t_min, t_max, count); });
 }
+template u8 any_in_group(const Group&, const LaneRay&, float, float, NoCounters&);
+template u8 any_in_group(const Group&, const LaneRay&, float, float, Counters&);
 
 }  // namespace luch::cpu

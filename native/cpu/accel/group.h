@@ -45,9 +45,11 @@ struct Group {
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                  const AccelChoice& choice, ThreadPool& pool);
 
-// The ray in the group's space, valid, 0 <= t_min; hit->t its upper end.
-void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* hit);
+// The ray in the group's space, valid, 0 <= t_min; hit->t its upper end. Count: Counters, or NoCounters.
+template <class Count>
+void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHit* hit, Count& count);
 // A Blocked value.
-u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max);
+template <class Count>
+u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max, Count& count);
 
 }  // namespace luch::cpu

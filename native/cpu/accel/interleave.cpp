@@ -105,7 +105,8 @@ LUCH_FN bool pop(Flight& flight, float t_max) {
 // One node or one leaf of one ray; false when the ray is done.
 LUCH_FN bool step(const Group& group, Flight& flight, RefHit* best) {
     if (flight.current & LEAF) {
-        closest_in_leaf(group, flight.block, flight.current, best);
+        NoCounters none;
+        closest_in_leaf(group, flight.block, flight.current, best, none);
         return pop(flight, best->t);
     }
     const Node8& node = group.nodes[flight.current];

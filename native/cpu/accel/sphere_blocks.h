@@ -57,11 +57,12 @@ LUCH_FN bool hit_sphere(const SphereBlock& block, u32 lane, const SphereBlockRay
     return intersect_sphere<P>(ray.exact_origin, ray.exact_direction, outside, ray.t_min, t_max, t);
 }
 
-template <Precision P>
-LUCH_FN void closest_in_leaf(const Group& group, const SphereBlockRay<P>& ray, u32 leaf, RefHit* best) {
+template <Precision P, class Count>
+LUCH_FN void closest_in_leaf(const Group& group, const SphereBlockRay<P>& ray, u32 leaf, RefHit* best, Count& count) {
     u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
     for (u32 b = first; b < end; ++b) {
         const SphereBlock& block = group.sphere_blocks[b];
+        count_block(block, count);
         for (u32 mask = line_may_touch(block, ray); mask; mask &= mask - 1) {
             u32 lane = u32(__builtin_ctz(mask));
             float t;
@@ -70,11 +71,13 @@ LUCH_FN void closest_in_leaf(const Group& group, const SphereBlockRay<P>& ray, u
     }
 }
 
-template <Precision P>
-LUCH_FN void any_in_leaf(const Group& group, const SphereBlockRay<P>& ray, u32 leaf, float t_max, u8* result) {
+template <Precision P, class Count>
+LUCH_FN void any_in_leaf(const Group& group, const SphereBlockRay<P>& ray, u32 leaf, float t_max, u8* result,
+                         Count& count) {
     u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
     for (u32 b = first; b < end; ++b) {
         const SphereBlock& block = group.sphere_blocks[b];
+        count_block(block, count);
         for (u32 mask = line_may_touch(block, ray); mask; mask &= mask - 1) {
             u32 lane = u32(__builtin_ctz(mask));
             float t;

@@ -4,6 +4,7 @@
 
 #include "cpu/accel/bvh8.h"
 #include "cpu/accel/simd.h"
+#include "luch/accel/primitives.h"
 #include "luch/geometry/box.h"
 #include "luch/geometry/triangle.h"
 #include "luch/math/bounds.h"
@@ -220,14 +221,15 @@ LUCH_FN u32 push_children(const Node8& node, u32 mask, f8 entry, u64** top_of_st
 
 // Calls leaf(its child word) nearest leaves first; leaf lowers *t_max when it finds a hit. Boxes entered
 // at exactly t_max are still visited: a hit there may have the smaller id.
-template <class Leaf>
-LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* t_max, Leaf&& leaf) {
+template <class Leaf, class Count>
+LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* t_max, Leaf&& leaf, Count& count) {
     u64 stack[STACK_SIZE];  // entry distance, child: never negative, so distances sort as integers do
     u64* top = stack;
     u32 current = 0;
     for (;;) {
         while (!(current & LEAF)) {
             const Node8& node = nodes[current];
+            count.node(sizeof(Node8), 8);
             f8 entry;
             u32 mask = intersect_node(node, ray, *t_max, &entry);
             if (!mask) goto pop;
@@ -244,14 +246,15 @@ LUCH_FN void visit_closest(const Node8* nodes, const NodeRay& ray, const float* 
 }
 
 // Calls leaf(its child word) in no particular order until it returns true.
-template <class Leaf>
-LUCH_FN void visit_any(const Node8* nodes, const NodeRay& ray, float t_max, Leaf&& leaf) {
+template <class Leaf, class Count>
+LUCH_FN void visit_any(const Node8* nodes, const NodeRay& ray, float t_max, Leaf&& leaf, Count& count) {
     u32 stack[STACK_SIZE];
     u32* top = stack;
     u32 current = 0;
     for (;;) {
         while (!(current & LEAF)) {
             const Node8& node = nodes[current];
+            count.node(sizeof(Node8), 8);
             f8 entry;
             u32 mask = intersect_node(node, ray, t_max, &entry);
             if (!mask) goto pop;

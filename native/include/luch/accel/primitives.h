@@ -43,6 +43,12 @@ struct Counters {
         bytes += size;
     }
     LUCH_FN void list(u32 size) { bytes += size; }
+    LUCH_FN void add(const Counters& other) {
+        nodes += other.nodes;
+        boxes += other.boxes;
+        primitives += other.primitives;
+        bytes += other.bytes;
+    }
 };
 struct NoCounters {
     LUCH_FN void node(u32, u32) {}
