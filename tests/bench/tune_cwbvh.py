@@ -41,6 +41,7 @@ VARIANTS: dict[str, dict[str, int]] = {
     "new rays at once": {"LOST_STEPS": 4, "SPARE_LANES": 2},
     "stack: 4 shared": {"SHARED_ENTRIES": 4},
     "stack: 12 shared": {"SHARED_ENTRIES": 12},
+    "asides in few banks": {"ODD_ASIDES": 0},
 }
 PLAIN_FLAGS = compiler.flags
 

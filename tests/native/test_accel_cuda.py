@@ -237,3 +237,25 @@ def test_rays_of_a_wrong_shape_raise_one_clear_error(place: str) -> None:
 )  # fmt: skip
 def test_gate_sees_instructions_that_a_precision_must_not_have(precision: str, line: str, wrong: bool) -> None:
     assert bool(faults(("BVH2", precision), f"\t{line}, %x;\n")) == wrong
+
+
+@pytest.mark.parametrize("precision", ["WATERTIGHT", "FAST"], ids="fibers-{}".format)
+def test_lanes_of_the_wide_tree_keep_out_of_each_others_shared_memory(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, tmp_path: Path, precision: Any
+) -> None:
+    """With every thread's arrays apart the hits are the same: no thread reads what another wrote, none can race."""
+    monkeypatch.setitem(sys.modules, "cupy", cuda_on_cpu.fake_cupy())
+    monkeypatch.setattr(compiler, "AHEAD", tmp_path)
+
+    def compiled(module: str, precision: str, architecture: int) -> bytes:
+        source, folders = compiler.source_of(module), list(compiler.source_folders())
+        return cuda_on_cpu.compile_module(source, precision, tmp_path, folders, shares_memory=False).encode()
+
+    monkeypatch.setattr(compiler, "compiled", compiled)
+    _forget()
+    request.addfinalizer(_forget)
+    mesh = HARD_MESHES["soup"]
+    rays = some_rays(mesh, FIBERS)
+    ours = Accel(*mesh, kind="CWBVH", precision=precision, device="CUDA")
+    check_equal(ours.closest(rays), Accel(*mesh, kind="CWBVH", precision=precision).closest(rays))
+    assert np.array_equal(ours.any(rays), Accel(*mesh, kind="CWBVH", precision=precision).any(rays))

@@ -15,7 +15,9 @@
 #define __global__
 #define __device__
 #define __host__
+#ifndef __shared__
 #define __shared__ static
+#endif
 #define __forceinline__ inline
 #define __launch_bounds__(...)
 

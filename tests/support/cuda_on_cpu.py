@@ -51,8 +51,11 @@ class _Event:
         pass
 
 
-def compile_module(source: Path, precision: str, folder: Path, include: list[Path]) -> str:
-    """The kernels of one .cu file as a library, its path: run_NAME(parameters, grid, block) for each."""
+def compile_module(source: Path, precision: str, folder: Path, include: list[Path], shares_memory: bool = True) -> str:
+    """The kernels of one .cu file as a library, its path: run_NAME(parameters, grid, block) for each.
+
+    shares_memory: False gives every thread an array of its own where the source says __shared__.
+    """
     text = _reached(source, include[1])
     names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", text)))
     builds = re.findall(r"LUCH_BUILD_KERNEL\((\w+)\)\(const luch::BuildTask", text)
@@ -71,6 +74,7 @@ def compile_module(source: Path, precision: str, folder: Path, include: list[Pat
     file.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n#include "{source}"\n{runs}')
     library = file.with_suffix(".so")
     options = [f"-DLUCH_PRECISION={precision}", *(f"-I{path}" for path in include)]
+    options += [] if shares_memory else ["-D__shared__="]
     subprocess.run(["c++", *FLAGS, *options, str(file), "-o", str(library)], check=True)
     return str(library)
 

@@ -23,6 +23,9 @@
 #ifndef LUCH_LEAF_SHARE
 #define LUCH_LEAF_SHARE 5
 #endif
+#ifndef LUCH_ODD_ASIDES
+#define LUCH_ODD_ASIDES 1
+#endif
 
 namespace luch {
 
@@ -84,7 +87,9 @@ __device__ __forceinline__ T load_quads(const T* from) {  // 16 bytes at a time,
     return out;
 }
 
-// What a lane needs at leaves and at the end alone: in shared memory, so that registers are left for boxes.
+// What a lane needs at leaves and at the end alone: in shared memory, so that registers are left for boxes. Each lane
+// has its own and nobody reads another's, so no barrier stands between writing and reading, here and in the stacks'
+// columns. (A test runs the kernel with these arrays private to every thread: the same hits.)
 template <Precision P>
 struct Aside {
     PrimitiveRay<P> tested;
@@ -92,6 +97,10 @@ struct Aside {
     float t_min;
     u32 index;
 };
+// Asides lie an odd number of 8-byte words apart: lanes that read the same member then meet in no bank. At 96 bytes,
+// without the odd word, eight lanes would meet in each.
+template <Precision P>
+inline constexpr u32 ASIDE_WORDS = u32(sizeof(Aside<P>) / sizeof(u64)) | u32(LUCH_ODD_ASIDES);
 
 // One lane's ray on its way.
 template <Precision P, bool ANY>
@@ -194,12 +203,12 @@ __device__ __forceinline__ void test_leaves(const Cwbvh& tree, const RayBatch& b
 template <Precision P, bool ANY>
 __device__ __forceinline__ void trace_persistent(const Cwbvh& tree, const RayBatch& batch) {
     __shared__ u64 columns[SHARED_ENTRIES * RAY_BLOCK];
-    __shared__ u64 asides[RAY_BLOCK * sizeof(Aside<P>) / sizeof(u64)];
+    __shared__ u64 asides[RAY_BLOCK * ASIDE_WORDS<P>];
     static_assert(sizeof(Aside<P>) % sizeof(u64) == 0);
     u64 local[2 * CWBVH_MAX_DEPTH - SHARED_ENTRIES];
     SplitStack stack = {columns + threadIdx.x, local, 0};
     Walker<P, ANY> walker;
-    walker.aside = reinterpret_cast<Aside<P>*>(asides) + threadIdx.x;
+    walker.aside = reinterpret_cast<Aside<P>*>(asides + threadIdx.x * ASIDE_WORDS<P>);
     walker.busy = false;
     RayPool pool;
     for (;;) {
