@@ -52,7 +52,9 @@ def test_automatic_says_what_it_measured() -> None:
     stats = render(heavy_scene(40)).stats
     assert stats["accelerator"] in KINDS
     assert re.search(r"\d million trial rays .* against .* \d", stats["accelerator_reason"])
-    assert "races" in render(heavy_scene(20_001)).stats["accelerator_reason"]
+    large = render(heavy_scene(20_000)).stats
+    assert large["accelerator"] == "BVH"
+    assert "without a trial on this scene: from 20000 primitives" in large["accelerator_reason"]
 
 
 def test_an_unknown_structure_is_refused_by_name() -> None:
