@@ -71,6 +71,8 @@ class InstanceCollector:
         """Say which properties of an object change nothing yet."""
         if subject.is_shadow_catcher and subject.type != "LIGHT":  # of lamps Blender sets it by itself
             self._context.warn(f'Object "{subject.name}" is a shadow catcher; Luch draws it as an ordinary object.')
+        if subject.shadow_terminator_shading_offset > 0.0 and subject.type != "LIGHT":
+            self._context.warn(f'Object "{subject.name}" has a Shading Offset, which Luch does not draw yet.')
         linking = subject.light_linking
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
             self._context.warn(
@@ -147,6 +149,7 @@ class InstanceCollector:
                 visibility=visibility,
                 holdout=holdout,
                 shadow_catcher=subject.is_shadow_catcher,
+                shadow_terminator=subject.shadow_terminator_geometry_offset,
                 lightgroup=subject.lightgroup or parent.lightgroup,
                 asset=asset_name(subject),
                 attributes=object_attributes(self._materials.attributes(slots), subject, parent),

@@ -166,6 +166,7 @@ struct Reader {
         in.holdout = py::cast<bool>(object.attr("holdout"));
         in.shadow_catcher = py::cast<bool>(object.attr("shadow_catcher"));
         in.lightgroup = lightgroup_index(lightgroups, py::cast<std::string>(object.attr("lightgroup")));
+        in.shadow_terminator = py::cast<float>(object.attr("shadow_terminator"));
         in.crypto_object = crypto_id(py::cast<std::string>(object.attr("name")));
         in.crypto_asset = crypto_id(py::cast<std::string>(object.attr("asset")));
         for (auto item : py::cast<py::dict>(object.attr("attributes"))) {

@@ -137,6 +137,7 @@ u32 SceneStore::add_object(const ObjectInput& input) {
     object.lightgroup = input.lightgroup;
     object.crypto_object = input.crypto_object;
     object.crypto_asset = input.crypto_asset;
+    object.shadow_terminator = input.shadow_terminator;
     object.first_attribute = NONE;
     for (const auto& [name, value] : input.values) {
         const AttributeView view{u32(attribute_data_.size()), 4, Domain::MESH};

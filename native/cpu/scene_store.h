@@ -44,6 +44,7 @@ struct ObjectInput {
     bool holdout, shadow_catcher;
     u32 lightgroup;
     float crypto_object, crypto_asset;
+    float shadow_terminator;
     std::vector<std::pair<std::string, std::array<float, 4>>> values;  // attributes of the object itself
 };
 

@@ -66,6 +66,9 @@ class Object:
     lightgroup: str = ""
     # Values of the object itself that programs ask for as "object:NAME" or "instancer:NAME": red, green, blue, alpha.
     attributes: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    # Cosine of the light with the surface below which shadow rays leave from the curved surface that smooth normals
+    # speak of (Blender's Shadow Terminator > Geometry Offset); 0: never.
+    shadow_terminator: float = 0.0
     asset: str = ""  # name for Cryptomatte Asset (the top of the parent chain)
 
 

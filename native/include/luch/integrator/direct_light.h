@@ -67,6 +67,22 @@ LUCH_FN void setup_light_lane(const RenderView& scene, const PathState& path, u3
     setup_free_lane(in, s.kind == EmitterKind::LAMP ? s.normal : -s.direction, points, lane);
 }
 
+// Where a shadow ray leaves the surface. Where light grazes it, the flat triangles of a smooth-shaded mesh would shade
+// themselves in steps: there the ray starts from the curved surface, wholly up to the cutoff, fading out to twice it.
+LUCH_FN Vec3 shadow_ray_origin(const ShadePoints& points, int lane, SurfacePoint spot, Vec3 direction) {
+    Vec3 ng = lane_face_normal(points, lane), n = lane_normal(points, lane);
+    float cutoff = points.terminator[lane], cosine = dot(n, direction);
+    if (!(cutoff > 0.0f)) return offset_origin(spot, ng, direction);
+    float side = cosine < 0.0f ? -1.0f : 1.0f, cos_face = side * dot(ng, direction);
+    float share = saturate_f(cosine < cutoff ? 2.0f - (cos_face + cosine) / cutoff : 1.0f - cos_face / cutoff);
+    float height = share * (cosine < 0.0f ? points.below[lane] : points.above[lane]);
+    if (height > 0.0f) {
+        spot.p += n * (side * height);
+        spot.error += gamma_f(1) * abs_v(spot.p);
+    }
+    return offset_origin(spot, ng, direction);
+}
+
 // The ray to the sampled light and what it brings; false where that is nothing. emission: of the light's program.
 LUCH_FN bool make_shadow_ray(const FilmLayout& layout, const PathState& path, u32 path_index, const ShadePoints& points,
                              int lane, const ClosureSet& set, const SurfacePoint& spawn, const LightSample& s,
@@ -81,7 +97,7 @@ LUCH_FN bool make_shadow_ray(const FilmLayout& layout, const PathState& path, u3
     float lobes = lobe_weight_sum(set);
     bsdf_pdf *= lobes / (lobes + average(set.transparent));
     float weight = (s.mis ? mis_weight(s.pdf_sa, bsdf_pdf) : 1.0f) / s.pdf_sa;
-    ray->origin = offset_origin(spawn, ng, s.direction);
+    ray->origin = shadow_ray_origin(points, lane, spawn, s.direction);
     ray->t_min = 0.0f;
     ray->direction = s.direction;
     ray->t_max = s.distance;
@@ -116,7 +132,7 @@ LUCH_FN void make_ao_ray(const RenderView& scene, const PathState& path, u32 pat
     Vec3 t, b;
     make_frame(n, &t, &b);
     Vec3 direction = to_world(sample_cosine_hemisphere(u), t, b, n);
-    *ray = {offset_origin(spawn, lane_face_normal(points, lane), direction), 0.0f, direction, scene.limits.ao_distance};
+    *ray = {shadow_ray_origin(points, lane, spawn, direction), 0.0f, direction, scene.limits.ao_distance};
     *shadow = ShadowRay{};
     shadow->contribution = path.throughput * (make_vec3(1.0f) - set.transparent);
     shadow->path = path_index;

@@ -21,12 +21,15 @@ struct alignas(64) ShadePoints {
     float u[SHADE_LANES], v[SHADE_LANES];       // barycentrics, as in Hit
     float ray_length[SHADE_LANES];              // distance travelled by the last ray, metres
     float footprint[SHADE_LANES];               // radius of the ray's pixel cone at the point, metres
-    u32 flags[SHADE_LANES];                     // PathFlag
+    // How far the surface that smooth normals speak of may reach out of the flat triangle along the normal, and the
+    // other way, metres; the cosine of the light from which on shadow rays leave from there (0: never).
+    float above[SHADE_LANES], below[SHADE_LANES], terminator[SHADE_LANES];
+    u32 flags[SHADE_LANES];  // PathFlag
     u32 prim[SHADE_LANES], instance[SHADE_LANES];
-    u32 depth[SHADE_LANES];                     // bounces so far: total | diffuse<<8 | glossy<<16 | transmission<<24
+    u32 depth[SHADE_LANES];  // bounces so far: total | diffuse<<8 | glossy<<16 | transmission<<24
     u32 transparent_depth[SHADE_LANES];
-    u32 path[SHADE_LANES];                      // caller's path index
-    u32 seed[SHADE_LANES];                      // hash for stochastic nodes (none deterministic needs it)
+    u32 path[SHADE_LANES];  // caller's path index
+    u32 seed[SHADE_LANES];  // hash for stochastic nodes (none deterministic needs it)
     // For lamps and the world: the point is a direction; px..pz hold it, instance = NONE,
     // prim = light index for a lamp and NONE for the world.
 };

@@ -45,6 +45,7 @@ struct ObjectView {
     Vec3 location;       // world
     u32 lightgroup;      // bit index + 1, 0: none
     float crypto_object, crypto_asset;
+    float shadow_terminator; // cosine from which on shadow rays leave the curved surface; 0: never
 };
 
 struct MaterialView {

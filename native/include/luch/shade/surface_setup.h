@@ -10,18 +10,43 @@ LUCH_FN Vec3 world_face_normal(const InstanceView& instance, const Triangle& t) 
     return normalize_or(transform_direction_transposed(instance.to_object, n), n);
 }
 
-// Interpolated shading normal in world space; face_normal where the mesh is flat or the sum vanishes.
-LUCH_FN Vec3 world_smooth_normal(const SceneView& scene, const MeshView& mesh, const InstanceView& instance, u32 prim,
-                                 float u, float v, Vec3 face_normal) {
-    if (mesh.normals_domain == Domain::NONE_) return face_normal;
+// The curved surface that smooth normals speak of, at a point of its flat triangle.
+struct SmoothSurface {
+    Vec3 normal;           // unit, world, on the side of the face normal
+    float above, below;    // how far it may reach out of the triangle along the normal, and the other way; world
+};
+
+// Room over the triangle under the tangent plane at a corner, which is lifted where other corners are above it, and
+// the same below; at the point with weights wj, wk of the other corners j and k.
+LUCH_FN void limit_to_tangent(Vec3 normal, Vec3 to_j, Vec3 to_k, float wj, float wk, float* above, float* below) {
+    float j = dot(normal, to_j), k = dot(normal, to_k), height = wj * j + wk * k;
+    *above = min_f(*above, max_f(max_f(j, k), 0.0f) - height);
+    *below = min_f(*below, height - min_f(min_f(j, k), 0.0f));
+}
+
+// Of a triangle with normals. side: -1 where it is seen from behind. face_normal: taken where the normals' sum
+// vanishes. The curved surface lies under its tangent planes at the corners; as in Cycles, it is taken for the lowest.
+LUCH_FN SmoothSurface smooth_surface(const SceneView& scene, const MeshView& mesh, const InstanceView& instance,
+                                     u32 prim, float u, float v, float side, Vec3 face_normal) {
     u32 i0 = prim * 3, i1 = i0 + 1, i2 = i0 + 2;
     if (mesh.normals_domain == Domain::POINT) {
-        const u32* t = corners_of(scene, mesh, prim);
-        i0 = t[0], i1 = t[1], i2 = t[2];
+        const u32* corner = corners_of(scene, mesh, prim);
+        i0 = corner[0], i1 = corner[1], i2 = corner[2];
     }
-    Vec3 n = vec3_row(scene.normals, mesh.first_normal + i0) * (1.0f - u - v) +
-             vec3_row(scene.normals, mesh.first_normal + i1) * u + vec3_row(scene.normals, mesh.first_normal + i2) * v;
-    return normalize_or(transform_direction_transposed(instance.to_object, n), face_normal);
+    Vec3 n0 = vec3_row(scene.normals, mesh.first_normal + i0) * side;
+    Vec3 n1 = vec3_row(scene.normals, mesh.first_normal + i1) * side;
+    Vec3 n2 = vec3_row(scene.normals, mesh.first_normal + i2) * side;
+    float w = 1.0f - u - v;
+    Vec3 sum = n0 * w + n1 * u + n2 * v, n = transform_direction_transposed(instance.to_object, sum);
+    Triangle t = triangle_at(scene, mesh, prim);
+    Vec3 e01 = t.p[1] - t.p[0], e12 = t.p[2] - t.p[1], e20 = t.p[0] - t.p[2];
+    float above = INFINITE_DISTANCE, below = INFINITE_DISTANCE;
+    limit_to_tangent(n0, e01, -e20, u, v, &above, &below);
+    limit_to_tangent(n1, e12, -e01, v, w, &above, &below);
+    limit_to_tangent(n2, e20, -e12, w, u, &above, &below);
+    // Normals shrink as the object grows: so much it is scaled along them.
+    float scale = safe_divide(length_squared(sum), length(n));
+    return {normalize_or(n, face_normal), above * scale, below * scale};
 }
 
 struct LaneInputs {
@@ -38,18 +63,16 @@ struct LaneInputs {
 LUCH_FN void setup_surface_lane(const SceneView& scene, const LaneInputs& in, ShadePoints& points, int lane) {
     const InstanceView& instance = scene.instances[in.instance];
     const MeshView& mesh = scene.meshes[instance.mesh];
-    Vec3 ng, n;
-    if (is_sphere(mesh, in.prim)) {
-        ng = n = in.radial;
-    } else {
-        ng = world_face_normal(instance, triangle_at(scene, mesh, in.prim));
-        n = world_smooth_normal(scene, mesh, instance, in.prim, in.u, in.v, ng);
-    }
+    bool round = is_sphere(mesh, in.prim);
+    Vec3 ng = round ? in.radial : world_face_normal(instance, triangle_at(scene, mesh, in.prim));
     bool back = dot(ng, in.to_viewer) < 0.0f;
-    if (back) {
-        ng = -ng;
-        n = -n;
-    }
+    if (back) ng = -ng;
+    SmoothSurface smooth = {ng, 0.0f, 0.0f};
+    if (!round && mesh.normals_domain != Domain::NONE_)
+        smooth = smooth_surface(scene, mesh, instance, in.prim, in.u, in.v, back ? -1.0f : 1.0f, ng);
+    Vec3 n = smooth.normal;
+    points.above[lane] = smooth.above, points.below[lane] = smooth.below;
+    points.terminator[lane] = scene.objects[instance.object].shadow_terminator;
     points.px[lane] = in.point.x, points.py[lane] = in.point.y, points.pz[lane] = in.point.z;
     points.nx[lane] = n.x, points.ny[lane] = n.y, points.nz[lane] = n.z;
     points.gx[lane] = ng.x, points.gy[lane] = ng.y, points.gz[lane] = ng.z;
@@ -74,6 +97,7 @@ LUCH_FN void setup_free_lane(const LaneInputs& in, Vec3 normal, ShadePoints& poi
     points.ny[lane] = points.gy[lane] = normal.y;
     points.nz[lane] = points.gz[lane] = normal.z;
     points.ix[lane] = in.to_viewer.x, points.iy[lane] = in.to_viewer.y, points.iz[lane] = in.to_viewer.z;
+    points.above[lane] = points.below[lane] = points.terminator[lane] = 0.0f;
     points.u[lane] = in.u, points.v[lane] = in.v;
     points.ray_length[lane] = in.ray_length;
     points.footprint[lane] = in.footprint;
