@@ -1,4 +1,4 @@
-"""Meshes kept from frame to frame (Render Properties > Performance > Persistent Data)."""
+"""Meshes and point clouds kept from frame to frame (Render Properties > Performance > Persistent Data)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from luch.scene import Mesh
 
 from .context import ExportContext
 from .meshes import export_mesh
+from .points import export_points
 
 
 @dataclass
@@ -42,14 +43,17 @@ class MeshCache:
         self._generation += 1
 
     def mesh(self, subject: Any, parent: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
-        """The exported mesh of an object's evaluated data with at least the wanted attributes; None: no triangles."""
+        """The exported mesh of an object's evaluated data with at least the wanted attributes; None: nothing to draw."""
         data = subject.data
         address = data.as_pointer()
         entry = self._entries.get(address)
         owners = {datablock.original.session_uid for datablock in (subject, parent, data)}
         if entry is None or not wanted <= entry.wanted:
             wanted = wanted | (entry.wanted if entry else set())
-            mesh = export_mesh(data, wanted, _undeformed(subject, data), context)
+            if subject.type == "POINTCLOUD":
+                mesh = export_points(data, wanted, context)
+            else:
+                mesh = export_mesh(data, wanted, _undeformed(subject, data), context)
             self.read_count += 1
             entry = self._entries[address] = _Entry(mesh, wanted, owners, self._generation)
         entry.owners |= owners

@@ -19,7 +19,6 @@ LISTED_AGAIN_AS_MESH = frozenset({"CURVE", "SURFACE", "FONT", "META"})
 NOTHING_TO_DRAW = frozenset({"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "GREASEPENCIL"})
 NOT_SUPPORTED = {  # type -> what it is, the effect that is missing
     "CURVES": ("hair curves", "hair"),
-    "POINTCLOUD": ("a point cloud", "point clouds"),
     "VOLUME": ("a volume", "volumes"),
 }
 NO_OBJECT = -1
@@ -53,12 +52,14 @@ class InstanceCollector:
         self._solid: bool = context.view_layer.use_solid
 
     def add(self, item: Any) -> None:
-        """One instance: a mesh to draw, a lamp, or nothing for us."""
+        """One instance: a mesh or point cloud to draw, a lamp, or nothing for us."""
         subject = item.object
         kind = subject.type
         if kind == "MESH":
             if self._solid:
                 self._add_mesh(item, subject)
+        elif kind == "POINTCLOUD":  # whatever View Layer > Filter > Surfaces says, as in Cycles
+            self._add_mesh(item, subject)
         elif kind == "LIGHT":
             self._add_light(item, subject)
         elif kind in NOT_SUPPORTED:
@@ -137,7 +138,7 @@ class InstanceCollector:
             return NO_OBJECT
         result = self._context.result
         # A face that names a slot beyond the last shows the last.
-        missing = int(result.meshes[mesh].material_slots.max()) + 1 - len(slots)
+        missing = int(result.meshes[mesh].material_slots.max(initial=0)) + 1 - len(slots)
         slots += [slots[-1]] * max(0, missing)
         result.objects.append(
             Object(

@@ -204,7 +204,9 @@ def describe(scene: Scene) -> list[str]:
     film, settings, camera = scene.film, scene.settings, scene.camera
     triangles = [len(mesh.triangles) for mesh in scene.meshes]
     lines = [f"{scene.name}, frame {scene.frame}"]
-    lines.append(f"  meshes      {len(triangles)} with {sum(triangles):,} triangles")
+    spheres = sum(len(mesh.spheres) for mesh in scene.meshes if mesh.spheres is not None)
+    points = f", {spheres:,} spheres" if spheres else ""
+    lines.append(f"  meshes      {len(triangles)} with {sum(triangles):,} triangles{points}")
     if scene.instances is not None:
         mesh_of = np.array([o.mesh for o in scene.objects] or [0])
         seen = np.array(triangles or [0])[mesh_of[scene.instances.object]].sum() if len(scene.instances.object) else 0

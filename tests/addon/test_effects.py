@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from luch.effects import Effects, effects_of
+from support.objects import point_cloud
 
 from addon import engine
 
@@ -104,11 +105,6 @@ def displaced(scene: bpy.types.Scene) -> None:
     tree.links.new(lift.outputs[0], tree.nodes["Material Output"].inputs["Displacement"])
 
 
-def points(scene: bpy.types.Scene) -> None:
-    cloud = bpy.data.pointclouds.new("Dust")
-    scene.collection.objects.link(bpy.data.objects.new("Dust", cloud))
-
-
 def skin(scene: bpy.types.Scene) -> None:
     surface(scene).inputs["Subsurface Weight"].default_value = 0.5
 
@@ -119,7 +115,6 @@ def skin(scene: bpy.types.Scene) -> None:
         ("motion blur", motion, "Scene"),
         ("volumes", volume, "Leaves"),
         ("displacement", displaced, "Leaves"),
-        ("point clouds", points, "Dust"),
         ("subsurface", skin, "Leaves"),
     ],
 )
@@ -131,6 +126,14 @@ def test_what_is_asked_for_in_vain_is_named(
     found = exported(room)[effect]
     assert found.state == "not yet"
     assert who in found.reason
+
+
+def test_point_clouds_are_told(room: bpy.types.Scene) -> None:
+    assert not exported(room)["point clouds"].on
+    point_cloud("Dust", [(0, 0, 0), (0, 0, 1), (0, 0, 2)])
+    found = exported(room)["point clouds"]
+    assert found.on
+    assert found.reason == '"Dust": 3 spheres'
 
 
 def test_world_and_lamps_are_told_as_they_are_built(room: bpy.types.Scene) -> None:

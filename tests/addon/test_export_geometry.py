@@ -248,10 +248,10 @@ def test_a_transform_that_is_not_finite_leaves_the_object_out(scene: bpy.types.S
 
 
 def test_an_unsupported_object_is_named_once(scene: bpy.types.Scene) -> None:
-    cloud = bpy.data.objects.new("Dust", bpy.data.pointclouds.new("Dust"))
-    scene.collection.objects.link(cloud)
+    hair = bpy.data.objects.new("Fur", bpy.data.hair_curves.new("Fur"))
+    scene.collection.objects.link(hair)
     (warning,) = export().warnings
-    assert warning.startswith('Object "Dust" is a point cloud')
+    assert warning.startswith('Object "Fur" is hair curves')
 
 
 def test_name_hash_is_the_one_that_object_info_shows() -> None:

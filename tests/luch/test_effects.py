@@ -210,6 +210,15 @@ def test_instancing_is_on_where_a_mesh_is_drawn_twice() -> None:
     assert effects_of(scene(principled))["instancing"].reason == "every mesh is drawn once"
 
 
+def test_point_clouds_are_told_with_their_spheres() -> None:
+    subject = scene(principled, copies=3)
+    assert effects_of(subject)["point clouds"].reason == "the scene has none"
+    subject.meshes[0].spheres = np.ones((5, 4), np.float32)
+    effects = effects_of(subject)
+    assert (effects["point clouds"].on, effects["point clouds"].reason) == (True, '"Triangle": 5 spheres')
+    assert effects["instancing"].cost == "saves 2 triangles and 10 spheres"
+
+
 @pytest.mark.parametrize("effect", ["motion blur", "hair", "point clouds", "volumes", "displacement", "subsurface"])
 def test_what_the_exporter_left_out_is_named_in_its_own_words(effect: str) -> None:
     subject = scene(principled)

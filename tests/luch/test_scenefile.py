@@ -56,9 +56,13 @@ def full_scene() -> Scene:
         material_slots=np.uint16([0, 1]),
         normals=shared,
         normals_domain="POINT",
-        attributes={"UVMap": Attribute(rng.random((6, 2), dtype=np.float32), "CORNER")},
+        attributes={
+            "UVMap": Attribute(rng.random((6, 2), dtype=np.float32), "CORNER"),
+            "tint": Attribute(rng.random((3, 4), dtype=np.float32), "SPHERE"),
+        },
         uv_active="UVMap",
         texture_location=(1.0, 0.1, -3.5),
+        spheres=rng.random((3, 4), dtype=np.float32),
     )
     instances = Instances(
         object=np.uint32([0, 0]),

@@ -22,7 +22,7 @@ def _tangent(c: Compiler, node: bpy.types.Node, anisotropy: Value) -> Vector:
     """The tangent, radial about Z where none is linked; zero where nothing is anisotropic."""
     if c.builder.known(anisotropy) == 0.0:
         return c.builder.vector(0.0, 0.0, 0.0)
-    return c.vector_or(node, "Tangent", lambda: c.builder.op3("TANGENT_RADIAL", (), (0, 0, 2)))
+    return c.vector_or(node, "Tangent", lambda: c.builder.op3("TANGENT_RADIAL", (), (0, 0, 3)))
 
 
 def _params(c: Compiler, *words: int) -> tuple[int, ...]:

@@ -103,7 +103,7 @@ def geometry(c: Compiler, node: bpy.types.Node) -> Outputs:
     outputs: Outputs = {
         "Position": position(c),
         "Normal": normal(c),
-        "Tangent": b.op3("TANGENT_RADIAL", (), (0, 0, 2)),
+        "Tangent": b.op3("TANGENT_RADIAL", (), (0, 0, 3)),
         "True Normal": b.op3("POINT_TRUE_NORMAL"),
         "Incoming": b.op3("POINT_INCOMING"),
         "Parametric": b.op3("POINT_PARAMETRIC", (), corner),
@@ -243,9 +243,16 @@ def ambient_occlusion(c: Compiler, node: bpy.types.Node) -> Outputs:
     return {"Color": c.color(node, "Color"), "AO": c.builder.constant(1.0)}
 
 
-@emitter("ShaderNodeHairInfo", "ShaderNodePointInfo", "ShaderNodeParticleInfo", "ShaderNodeVolumeInfo")
+@emitter("ShaderNodePointInfo")
+def point_info(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Point Info: of a point cloud's point; on a mesh zero."""
+    x, y, z, radius, random = c.builder.op("POINT_INFO")
+    return {"Position": (x, y, z), "Radius": radius, "Random": random}
+
+
+@emitter("ShaderNodeHairInfo", "ShaderNodeParticleInfo", "ShaderNodeVolumeInfo")
 def no_such_geometry(c: Compiler, node: bpy.types.Node) -> Outputs:
-    """Hair, Point, Particle and Volume Info on a mesh: zero, as in Cycles."""
+    """Hair, Particle and Volume Info on a mesh: zero, as in Cycles."""
     return {
         socket.identifier: c.builder.vector(0.0, 0.0, 0.0)
         if socket.type in ("VECTOR", "RGBA")

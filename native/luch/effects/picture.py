@@ -5,7 +5,7 @@ from __future__ import annotations
 from luch.effects.shown import Shown
 from luch.effects.surfaces import facts
 from luch.effects.table import Effects
-from luch.scene import Film
+from luch.scene import Film, Mesh
 
 _SUM_BYTES = 8  # a number of the film is a double
 # Pass -> numbers of its own that a pixel keeps.
@@ -25,7 +25,6 @@ _LATER = (
     ("motion blur", "Camera", "the scene asks for no motion blur"),
     ("stereoscopy", "Camera", "the scene is not stereoscopic"),
     ("hair", "Geometry", "the scene has none"),
-    ("point clouds", "Geometry", "the scene has none"),
     ("volumes", "Geometry", "no object, material or world has a volume"),
     ("displacement", "Geometry", "no material displaces its surface"),
     ("light linking", "Light", "no object uses it"),
@@ -53,15 +52,35 @@ def add_camera(effects: Effects, shown: Shown) -> None:
 
 
 def add_geometry(effects: Effects, shown: Shown) -> None:
-    """Instances."""
+    """Instances, point clouds."""
     repeated = {mesh: count for mesh, count in shown.uses.items() if count > 1}
     if repeated:
-        saved = sum(len(shown.scene.meshes[mesh].triangles) * (count - 1) for mesh, count in repeated.items())
+        triangles, spheres = (
+            sum(count_of(shown.scene.meshes[mesh]) * (count - 1) for mesh, count in repeated.items())
+            for count_of in (_triangle_count, _sphere_count)
+        )
+        saved = f"{triangles:,} triangles" + (f" and {spheres:,} spheres" if spheres else "")
         meshes = "1 mesh is" if len(repeated) == 1 else f"{len(repeated)} meshes are"
         reason = f"{meshes} drawn {sum(repeated.values()):,} times"
-        effects.add("Geometry", "instancing", True, reason, cost=f"saves {saved:,} triangles")
+        effects.add("Geometry", "instancing", True, reason, cost=f"saves {saved}")
     else:
         effects.add("Geometry", "instancing", False, "every mesh is drawn once" if shown.uses else "nothing is drawn")
+    clouds = {mesh: count for mesh in shown.uses if (count := _sphere_count(shown.scene.meshes[mesh]))}
+    if clouds:
+        first = shown.scene.meshes[next(iter(clouds))].name
+        more = f" and {len(clouds) - 1} more" if len(clouds) > 1 else ""
+        reason = f'"{first}"{more}: {sum(clouds.values()):,} spheres'
+        effects.add("Geometry", "point clouds", True, reason, cost="a search of their own for every ray")
+    elif "point clouds" not in shown.scene.unsupported:  # as in a file of a Luch that could not draw them
+        effects.add("Geometry", "point clouds", False, "the scene has none")
+
+
+def _triangle_count(mesh: Mesh) -> int:
+    return len(mesh.triangles)
+
+
+def _sphere_count(mesh: Mesh) -> int:
+    return 0 if mesh.spheres is None else len(mesh.spheres)
 
 
 def add_paths(effects: Effects, shown: Shown) -> None:

@@ -1,4 +1,4 @@
-"""What of a scene is drawn: instances, their meshes, and the materials that lie on some triangle of them."""
+"""What of a scene is drawn: instances, their meshes, and the materials that lie on some primitive of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from luch.effects.programs import Reading, read_program
 from luch.scene import Mesh, Scene
 
 SHADOW = 32  # RayKind bit of shadow rays, as in Object.visibility
-_BLOCK = 1 << 20  # triangles that are counted at a time: counting widens them to 8 bytes each
+_BLOCK = 1 << 20  # slots that are counted at a time: counting widens them to 8 bytes each
 
 
 @dataclass
@@ -24,6 +24,7 @@ class Surface:
     transparent_shadows: bool
     sampled_as_light: bool
     triangles: int = 0  # that show it, over all instances
+    spheres: int = 0
     blocks_light: bool = False  # some object with it is seen by shadow rays
 
     @property
@@ -36,7 +37,7 @@ class Shown:
     """What every effect is decided from."""
 
     scene: Scene
-    surfaces: list[Surface] = field(default_factory=list)  # that are on some triangle
+    surfaces: list[Surface] = field(default_factory=list)  # that are on some triangle or sphere
     idle: list[Surface] = field(default_factory=list)  # on none
     uses: dict[int, int] = field(default_factory=dict)  # mesh -> instances of it that are drawn
     holdouts: list[str] = field(default_factory=list)  # objects
@@ -59,7 +60,7 @@ def look_at(scene: Scene) -> Shown:
     ]
     _count(shown, surfaces)
     for surface in surfaces:
-        (shown.surfaces if surface.triangles else shown.idle).append(surface)
+        (shown.surfaces if surface.triangles or surface.spheres else shown.idle).append(surface)
     return shown
 
 
@@ -104,6 +105,11 @@ def _count(shown: Shown, surfaces: list[Surface]) -> None:
                 surface = surfaces[subject.materials[min(slot, len(subject.materials) - 1)]]
                 surface.triangles += triangles * count
                 surface.blocks_light |= bool(subject.visibility & SHADOW)
+        spheres = scene.meshes[subject.mesh].spheres
+        if spheres is not None and len(spheres) and subject.materials:  # all show the first slot
+            surface = surfaces[subject.materials[0]]
+            surface.spheres += len(spheres) * count
+            surface.blocks_light |= bool(subject.visibility & SHADOW)
 
 
 def _triangles_by_slot(mesh: Mesh) -> NDArray[np.int64]:

@@ -49,11 +49,16 @@ LUCH_FN Vec3 surface_tangent(const OpContext& c, Vec3 direction_object) {
     Vec3 t = normal_to_world(instance_at(c), direction_object);
     return cross(n, normalize(cross(t, n)));
 }
-struct OpTangentRadial {  // params: stencil (unused corner 0), axis 0..2
+// params: stencil (unused corner 0), axis 0..2; 3: the surface's own tangent, around Z on a mesh. A sphere of a point cloud
+// has no generated coordinates: places in Blender's world serve, and any tangent is its own.
+struct OpTangentRadial {
     static constexpr int inputs = 0, outputs = 3, params = 3;
     static constexpr bool reads_point = true;
     LUCH_FN_SLOW static void eval(const OpContext& c, const u32* params, const float*, float* out) {
-        Vec3 g = generated_at(c, params) - make_vec3(0.5f);
+        const InstanceView* i = instance_at(c);
+        const bool sphere = i && is_sphere(c.scene->meshes[i->mesh], c.points->prim[c.lane]);
+        if (sphere && params[2] == 3) return store_vec3(out, footprint_stencil(normal_at(c), 1.0f).dx);
+        Vec3 g = (sphere ? blender_position(c, position_at(c)) : generated_at(c, params)) - make_vec3(0.5f);
         Vec3 t = params[2] == 0   ? make_vec3(0.0f, -g.z, g.y)
                  : params[2] == 1 ? make_vec3(-g.z, 0.0f, g.x)
                                   : make_vec3(-g.y, g.x, 0.0f);
