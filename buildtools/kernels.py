@@ -19,11 +19,10 @@ FOLDER = BUILD / "kernels"
 AHEAD = NATIVE / "luch" / "kernels"
 DEFAULT = "WATERTIGHT"
 OLDEST = 75  # PTX for it runs on everything newer
-FUSES_BOXES = "CWBVH"  # the one that rounds box distances once, on purpose (accel/wide_ray.h)
-WALKS_IN_DOUBLE = (
-    "GRID",
-    "HIERARCHICAL_GRID",
-)  # where a walk is in doubt, its cells are found in double (accel/grid.h)
+# Box distances are rounded once, on purpose (accel/wide_ray.h): in the compressed wide tree, which every scene's top is.
+FUSES_BOXES = re.compile("CWBVH|TRACE_.*")
+# Where a walk is in doubt, its cells are found in double (accel/grid.h).
+WALKS_IN_DOUBLE = re.compile("(TRACE_)?(HIERARCHICAL_)?GRID")
 Unit = Tuple[str, str]  # module, precision
 
 
@@ -34,11 +33,16 @@ def table() -> Dict[str, Any]:
 
 
 def units() -> List[Unit]:
-    """Every module in every precision."""
+    """Every module and tracer in every precision."""
     precisions = [name for name in table()["flags"] if name != "all"]
-    return [(module, precision) for module in table()["modules"] for precision in precisions] + [
+    return [(module, precision) for module in _traced() for precision in precisions] + [
         (builder, DEFAULT) for builder in table()["builders"]
     ]
+
+
+def _traced() -> Dict[str, str]:
+    """What walks structures: bare, and in a render."""
+    return {**table()["modules"], **table()["tracers"]}
 
 
 def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
@@ -58,7 +62,7 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
         ptx = ptx_of(unit)
         flags = table()["flags"]["all"] + table()["flags"][precision]
         folders = ["-I", str(NATIVE / "include"), "-I", str(NATIVE / "cuda")]
-        source = NATIVE / "cuda" / {**table()["modules"], **table()["builders"]}[module]
+        source = NATIVE / "cuda" / {**_traced(), **table()["builders"]}[module]
         errors = _errors([found, "-ptx", f"-arch=compute_{OLDEST}", *flags, *folders, str(source), "-o", str(ptx)])
         known = table()["architectures"]
         chosen = known if everywhere or precision == DEFAULT else [known[0], known[-1]]
@@ -94,11 +98,11 @@ def faults(unit: Unit, ptx: str) -> List[str]:
     """What a unit's instructions must not hold: slow doubles where speed is asked, sums fused behind our back."""
     module, precision = unit
     wrong = []
-    if precision == "FAST" and module not in WALKS_IN_DOUBLE and re.search(r"\.f64\b", ptx):
+    if precision == "FAST" and not WALKS_IN_DOUBLE.fullmatch(module) and re.search(r"\.f64\b", ptx):
         wrong.append("instructions in double precision (.f64), which FAST must not have")
     if precision != "FAST" and re.search(r"\bfma\.rn\.f64\b", ptx):
         wrong.append("fma.rn.f64: an edge function is contracted")
-    if precision != "FAST" and module != FUSES_BOXES and re.search(r"\bfma\.rn\.f32\b", ptx):
+    if precision != "FAST" and not FUSES_BOXES.fullmatch(module) and re.search(r"\bfma\.rn\.f32\b", ptx):
         wrong.append("fma.rn.f32: results would differ from the CPU's")
     if precision != "FAST" and re.search(r"\.ftz\b", ptx):
         wrong.append(".ftz: denormal numbers would be lost")

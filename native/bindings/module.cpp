@@ -13,6 +13,7 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_sampling(m);
     luch::bindings::bind_shade(m);
     luch::bindings::bind_sky(m);
+    luch::bindings::bind_scene_trees(m);
     luch::bindings::bind_structure(m);
     luch::bindings::bind_textures(m);
     luch::bindings::bind_triangle_tests(m);

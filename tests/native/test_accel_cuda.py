@@ -31,24 +31,8 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     if request.param == GPU:
         yield GPU
         return
-    folder = tmp_path_factory.mktemp("kernels")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, "cupy", cuda_on_cpu.fake_cupy())
-        patch.setattr(compiler, "AHEAD", folder)
-
-        def compiled(module: str, precision: str, architecture: int) -> bytes:
-            source = compiler.source_of(module)
-            return cuda_on_cpu.compile_module(source, precision, folder, list(compiler.source_folders())).encode()
-
-        patch.setattr(compiler, "compiled", compiled)
-        _forget()
+    with cuda_on_cpu.standing_in(tmp_path_factory.mktemp("kernels")):
         yield FIBERS
-    _forget()
-
-
-def _forget() -> None:
-    for cached in (device.cupy, device.available, compiler.load):
-        cached.cache_clear()
 
 
 def some_rays(mesh: Mesh, place: str) -> Any:
@@ -202,10 +186,10 @@ def test_arrays_on_the_gpu_are_answered_there() -> None:
 
 def test_missing_cupy_is_told_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cupy", None)
-    _forget()
+    cuda_on_cpu.forget()
     with pytest.raises(device.DeviceError, match="pip install cupy"):
         Accel(*soup(3), kind="BRUTE_FORCE", device="CUDA")
-    _forget()
+    cuda_on_cpu.forget()
 
 
 def test_key_of_a_kernel_covers_headers_and_flags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,22 +224,12 @@ def test_gate_sees_instructions_that_a_precision_must_not_have(precision: str, l
 
 
 @pytest.mark.parametrize("precision", ["WATERTIGHT", "FAST"], ids="fibers-{}".format)
-def test_lanes_of_the_wide_tree_keep_out_of_each_others_shared_memory(
-    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, tmp_path: Path, precision: Any
-) -> None:
+def test_lanes_of_the_wide_tree_keep_out_of_each_others_shared_memory(tmp_path: Path, precision: Any) -> None:
     """With every thread's arrays apart the hits are the same: no thread reads what another wrote, none can race."""
-    monkeypatch.setitem(sys.modules, "cupy", cuda_on_cpu.fake_cupy())
-    monkeypatch.setattr(compiler, "AHEAD", tmp_path)
-
-    def compiled(module: str, precision: str, architecture: int) -> bytes:
-        source, folders = compiler.source_of(module), list(compiler.source_folders())
-        return cuda_on_cpu.compile_module(source, precision, tmp_path, folders, shares_memory=False).encode()
-
-    monkeypatch.setattr(compiler, "compiled", compiled)
-    _forget()
-    request.addfinalizer(_forget)
     mesh = HARD_MESHES["soup"]
     rays = some_rays(mesh, FIBERS)
-    ours = Accel(*mesh, kind="CWBVH", precision=precision, device="CUDA")
-    check_equal(ours.closest(rays), Accel(*mesh, kind="CWBVH", precision=precision).closest(rays))
-    assert np.array_equal(ours.any(rays), Accel(*mesh, kind="CWBVH", precision=precision).any(rays))
+    cpu = Accel(*mesh, kind="CWBVH", precision=precision)
+    with cuda_on_cpu.standing_in(tmp_path, shares_memory=False):
+        ours = Accel(*mesh, kind="CWBVH", precision=precision, device="CUDA")
+        check_equal(ours.closest(rays), cpu.closest(rays))
+        assert np.array_equal(ours.any(rays), cpu.any(rays))

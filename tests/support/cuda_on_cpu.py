@@ -9,11 +9,16 @@ from __future__ import annotations
 import ctypes
 import re
 import subprocess
+import sys
 import types
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
+from luch.cuda import compiler, device
 
 HERE = Path(__file__).parent
 FLAGS = ["-std=gnu++20", "-O1", "-march=x86-64-v3", "-ffp-contract=off", "-shared", "-fPIC", "-w"]
@@ -38,6 +43,9 @@ class Array(np.ndarray):  # type: ignore[type-arg]
     def get(self) -> Any:
         return np.array(self)
 
+    def set(self, given: Any) -> None:
+        self[...] = given
+
 
 def _array(given: Any, dtype: Any = None) -> Any:
     return np.array(given, dtype=dtype).view(Array)
@@ -59,16 +67,26 @@ def compile_module(source: Path, precision: str, folder: Path, include: list[Pat
     text = _reached(source, include[1])
     names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", text)))
     builds = re.findall(r"LUCH_BUILD_KERNEL\((\w+)\)\(const luch::BuildTask", text)
-    assert names or builds
-    runs = "".join(
-        f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
-        f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}(*(LUCH_VIEW*)p[0], *(luch::Primitives*)p[1], "
-        "*(luch::RayBatch*)p[2]); });\n}\n"
-        for name in names
-    ) + "".join(
-        f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
-        f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}(*(luch::BuildTask*)p[0]); }});\n}}\n"
-        for name in builds
+    traces = re.findall(r"LUCH_\w*TRACE_KERNEL\((\w+)\)\(LUCH_TRACE_ARGUMENTS\)", text)
+    assert names or builds or traces
+    runs = (
+        "".join(
+            f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
+            f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}(*(LUCH_VIEW*)p[0], *(luch::Primitives*)p[1], "
+            "*(luch::RayBatch*)p[2]); });\n}\n"
+            for name in names
+        )
+        + "".join(
+            f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
+            f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}(*(luch::BuildTask*)p[0]); }});\n}}\n"
+            for name in builds
+        )
+        + "".join(
+            f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
+            f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}(*(luch::TwoLevelView<LUCH_VIEW>*)p[0], "
+            "*(luch::TraceTask*)p[1]); });\n}\n"
+            for name in traces
+        )
     )
     file = folder / f"{source.stem}_{precision}.cpp"
     file.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n#include "{source}"\n{runs}')
@@ -127,3 +145,26 @@ def fake_cupy() -> Any:
         asnumpy=np.array, empty=lambda *a: np.full(*a[:1], 77, *a[1:]).view(Array),
         zeros=lambda *a: np.zeros(*a).view(Array), flatnonzero=lambda a: np.flatnonzero(a).view(Array), argsort=lambda a: np.argsort(a).view(Array),
     )  # fmt: skip
+
+
+@contextmanager
+def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
+    """Kernels that are loaded meanwhile run here; what is compiled lies in folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "cupy", fake_cupy())
+        patch.setattr(compiler, "AHEAD", folder)
+
+        def compiled(module: str, precision: str, architecture: int) -> bytes:
+            source, folders = compiler.source_of(module), list(compiler.source_folders())
+            return compile_module(source, precision, folder, folders, shares_memory).encode()
+
+        patch.setattr(compiler, "compiled", compiled)
+        forget()
+        yield
+    forget()
+
+
+def forget() -> None:
+    """What was loaded for the device so far."""
+    for cached in (device.cupy, device.available, compiler.load):
+        cached.cache_clear()

@@ -1,8 +1,7 @@
 // The compressed wide tree: collapsed from a binary one, its boxes rounded outwards to each node's grid (wide_ray.h).
-#include <cmath>
+#include "cpu/accel/build_cwbvh.h"
 
-#include "cpu/accel/collapse.h"
-#include "luch/accel/cwbvh.h"
+#include <cmath>
 
 namespace luch::cpu {
 namespace {
@@ -107,17 +106,11 @@ void quantise(const Tree2& tree, const Bvh2Node& parent, const WideChild* childr
     }
 }
 
-struct WideTree {
-    std::vector<CwbvhNode> nodes;
-    std::vector<u32> refs;  // of the leaves, in order
-    u32 depth = 0;
-};
-
-WideTree make_nodes(const Tree2& tree, const Collapse& collapse) {
+CwbvhNodes make_nodes(const Tree2& tree, const Collapse& collapse) {
     struct Open {
         u32 from, to, level;
     };
-    WideTree out;
+    CwbvhNodes out;
     out.refs.reserve(tree.refs.size());
     out.nodes.reserve(tree.nodes.size() / 8 + 1);
     out.nodes.resize(1);
@@ -176,8 +169,7 @@ class CompressedTree final : public StructureOf<Cwbvh> {
         Tree2 tree = build_tree2(input, 1, pool, cost);
         view_.root = tree.root;
         if (tree.nodes.empty()) return;
-        WideTree wide = make_nodes(tree, Collapse(tree, COSTS, pool));
-        if (wide.depth > CWBVH_MAX_DEPTH) throw std::length_error("The wide tree is too deep.");
+        CwbvhNodes wide = build_cwbvh_nodes(tree, COSTS, pool);
         nodes_ = HugeArray<CwbvhNode>(wide.nodes.size());
         std::copy(wide.nodes.begin(), wide.nodes.end(), nodes_.data());
         leaves_ = HugeArray<LeafPrimitive>(wide.refs.size());
@@ -200,6 +192,12 @@ class CompressedTree final : public StructureOf<Cwbvh> {
 };
 
 }  // namespace
+
+CwbvhNodes build_cwbvh_nodes(const Tree2& tree, const Collapse::Costs& costs, ThreadPool& pool) {
+    CwbvhNodes out = make_nodes(tree, Collapse(tree, costs, pool));
+    if (out.depth > CWBVH_MAX_DEPTH) throw std::length_error("The wide tree is too deep.");
+    return out;
+}
 
 std::unique_ptr<Structure> build_cwbvh(const StructureInput& input, ThreadPool& pool) {
     return std::make_unique<CompressedTree>(input, pool);

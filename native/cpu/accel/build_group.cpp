@@ -223,12 +223,6 @@ Tree8 collapse_tree(Group& group, const PrimBox* boxes, size_t kept, const Gathe
 
 }  // namespace
 
-const Member& Group::member_of(u32 ref) const {
-    auto after =
-        std::upper_bound(members.begin(), members.end(), ref, [](u32 r, const Member& m) { return r < m.first_ref; });
-    return *(after - 1);
-}
-
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                  const AccelChoice& choice, ThreadPool& pool) {
     Gather gather(group, scene, flags);

@@ -1,13 +1,12 @@
 // A group: the triangles of one mesh in its own space, or of several instances taken to the world; or the spheres of
 // one mesh in its own space (an instance may stretch them, so they are never taken to the world). It has one tree.
-// A ref is its member's first_ref + how far the primitive comes after the member's first, so refs sort as
-// (instance, prim) do.
 #pragma once
 #include <vector>
 
 #include "cpu/accel/accel.h"
 #include "cpu/accel/bvh8.h"
 #include "cpu/thread_pool.h"
+#include "luch/accel/instances.h"
 #include "luch/accel/primitives.h"
 #include "luch/shade/scene_view.h"
 
@@ -15,14 +14,7 @@ namespace luch::cpu {
 
 struct LaneRay;  // traverse.h
 
-struct Member {
-    u32 mesh;
-    u32 instance;  // NONE: the mesh in its own space
-    u32 first_ref;
-    u32 first_prim, prim_count;  // of the mesh
-
-    u32 prim_of(u32 ref) const { return ref - first_ref + first_prim; }
-};
+using Member = GroupMember;
 
 struct Group {
     std::vector<Member> members;  // by instance
@@ -38,7 +30,7 @@ struct Group {
     Box root;
     u64 kept = 0, dropped = 0;    // primitives
 
-    const Member& member_of(u32 ref) const;
+    const Member& member_of(u32 ref) const { return luch::member_of(members.data(), u32(members.size()), ref); }
 };
 
 // Fills everything but members and of_spheres, which say what to gather. flags: per mesh, per primitive PrimitiveFlag.

@@ -50,8 +50,8 @@ def _sources_hash() -> str:
 
 
 def source_of(module: str) -> Path:
-    """The .cu file of a module or builder of kernels.json."""
-    name: str = (table()["modules"] | table()["builders"])[module]
+    """The .cu file of a module, tracer or builder of kernels.json."""
+    name: str = (table()["modules"] | table()["tracers"] | table()["builders"])[module]
     return source_folders()[1] / name
 
 

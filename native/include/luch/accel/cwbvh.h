@@ -29,12 +29,14 @@ struct alignas(16) LeafPrimitive {
 };
 static_assert(sizeof(LeafPrimitive) == 48);
 
-struct Cwbvh {
+template <class Leaf>
+struct CwbvhOf {
     const CwbvhNode* nodes;
-    const LeafPrimitive* leaves;
+    const Leaf* leaves;
     Box root;
     u32 node_count, depth;  // levels of nodes below the root
 };
+using Cwbvh = CwbvhOf<LeafPrimitive>;
 
 inline constexpr u32 CWBVH_LEAF = 3;         // primitives
 inline constexpr u32 CWBVH_MAX_DEPTH = 96;   // and so entries of a stack; twice as many where leaves are postponed
@@ -91,9 +93,9 @@ LUCH_FN u32 intersect_children(const CwbvhNode& node, const WideRay& ray, float 
     return hits;
 }
 
-// Calls leaf(primitive) for all that the ray may hit before leaf.t_max(), until it returns true.
-template <class Stack, class Leaf, class Count>
-LUCH_FN void walk(const Cwbvh& tree, const WideRay& ray, Stack& stack, Leaf& leaf, Count& count) {
+// Calls leaf(item) for all that the ray may hit before leaf.t_max(), until it returns true.
+template <class Item, class Stack, class Leaf, class Count>
+LUCH_FN void walk(const CwbvhOf<Item>& tree, const WideRay& ray, Stack& stack, Leaf& leaf, Count& count) {
     if (tree.node_count == 0) return;
     WaitingGroup group = {0, 0x80000000u};
     float last = ray.upper(leaf.t_max());

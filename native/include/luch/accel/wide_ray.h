@@ -14,6 +14,9 @@
 // reach, the root's farthest corner. Take r = 2 / slope for both planes: the near distance is then at most 10 D and
 // the far one at least -10 D, so shifting them apart by 12 reach keeps every hit, and the widened slab is 6 slope reach.
 //
+// Wider boxes. A plane moved out by `extra` has its distance moved by extra r, the larger r for both: near and far shift
+// apart by as much. The shift rounds with B and with the last sum: 2 EPS of it more.
+//
 // Overflow. Nodes wider than WIDEST have NaN for p: their children are always entered. In all others |plane - o| and
 // |p - o| are alike once a product overflows, so that the infinite distance is right.
 #pragma once
@@ -63,10 +66,11 @@ struct WideRay {
     LUCH_FN bool negative(int axis) const { return octant >> (2 - axis) & 1u; }
 };
 
-LUCH_FN WideRay make_wide_ray(const Ray& ray, const Box& root) {
+// extra: by how much every box is to be wider (0 for none).
+LUCH_FN WideRay make_wide_ray(const Ray& ray, const Box& root, float extra = 0.0f) {
     WideRay out;
     Vec3 extent = max_v(abs_v(root.lo - ray.origin), abs_v(root.hi - ray.origin));
-    float reach = max_component(extent);
+    float reach = max_component(extent) + extra;
     out.scale = max_component(abs_v(ray.direction));
     out.octant = 0;
     out.byte_bias = BYTE_BIAS | float_bits(ray.t_max) >> 31;  // t_max > 0: no bit, but the compiler cannot tell
@@ -80,6 +84,7 @@ LUCH_FN WideRay make_wide_ray(const Ray& ray, const Box& root) {
         out.near_rdir[axis] = sign * (reciprocal * (1.0f - x) * (1.0f - 16.0f * EPS));
         out.far_rdir[axis] = sign * (reciprocal * (1.0f + 1.34f * x) * (1.0f + 16.0f * EPS));
         out.shift[axis] = parallel ? 12.0f * reach : 0.0f;
+        if (extra > 0.0f) out.shift[axis] += extra * abs_f(out.far_rdir[axis]) * (1.0f + 16.0f * EPS);
         out.octant |= (float_bits(ray.direction[axis]) >> 31) << (2 - axis);
     }
     return out;

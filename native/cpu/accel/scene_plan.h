@@ -1,0 +1,33 @@
+// How a scene is cut into groups of primitives, and what the entries' boxes are: for every scheme of two levels.
+#pragma once
+#include <vector>
+
+#include "cpu/accel/build_bvh8.h"
+#include "cpu/accel/group.h"
+#include "luch/accel/instances.h"
+
+namespace luch::cpu {
+
+struct ScenePlan {
+    std::vector<Group> groups;                       // what to gather
+    std::vector<GroupEntry> entries;
+    u64 dropped_triangles = 0, dropped_spheres = 0;  // of instances whose transforms are not finite
+};
+
+// flatten_triangles: how many copies of triangles there may be of instances taken to the world.
+ScenePlan plan_scene(const SceneView& scene, u64 flatten_triangles);
+
+// Builds every group's structure, then leaves out entries whose groups have no primitives.
+void build_groups(ScenePlan& plan, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
+                  const AccelChoice& choice, ThreadPool& pool);
+
+// Adds a built group's primitives.
+void count_primitives(const Group& group, AccelStats* stats);
+
+struct EntryBoxes {
+    HugeArray<PrimBox> boxes;  // id: the entry; finite
+    EntryError error;
+};
+EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene);
+
+}  // namespace luch::cpu

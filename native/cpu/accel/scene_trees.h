@@ -1,0 +1,40 @@
+// The scene as rays of a device see it (luch/accel/two_level.h): built here, walked here too, uploaded as an image.
+// The same hits as cpu/accel/accel.h gives, bit for bit.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "cpu/accel/accel.h"
+#include "cpu/device_image.h"
+
+namespace luch::cpu {
+
+struct SceneTreesStats : AccelStats {
+    u64 groups = 0, entries = 0;
+    u32 depth = 0;  // levels of nodes, top and deepest group together
+};
+
+class SceneTrees {
+ public:
+    // As Accel::build; the eight-wide tree of the CPU (choice.wide) is replaced by the compressed one. Throws Cancelled
+    // when the pool is told to give up.
+    static std::unique_ptr<SceneTrees> build(const SceneView& scene, const std::vector<std::vector<u8>>& flags,
+                                             ThreadPool& pool, const AccelChoice& choice = {},
+                                             u64 flatten_triangles = FLATTEN_TRIANGLES);
+    virtual ~SceneTrees() = default;
+
+    // Adds the view and everything behind it; returns the view's block: TwoLevelView<the structure>.
+    // The image borrows from this object.
+    virtual u32 append(DeviceImage& image) const = 0;
+    // All is one group in the world: kernels made for that (render/trace_one.cuh) may walk it.
+    virtual bool is_one_group() const = 0;
+    virtual StructureKind kind() const = 0;
+
+    // As Accel's, by the functions that devices run.
+    virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const = 0;
+    virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const = 0;
+
+    virtual SceneTreesStats stats() const = 0;
+};
+
+}  // namespace luch::cpu

@@ -1,0 +1,50 @@
+// Rays of a render through the scene's trees (luch/accel/two_level.h): what every kernel that traces them takes.
+//
+// A module has trace_closest and trace_any: BLOCK of luch/cuda/trace.py threads a block, as many blocks as fit at once;
+// warps fetch rays until there are none. That of the compressed wide tree has trace_closest_one and trace_any_one too,
+// for scenes that are one group in the world.
+#pragma once
+#include "luch/accel/two_level.h"
+#include "rays/structure.cuh"
+
+namespace luch {
+
+// Passed by value; luch/cuda/trace.py packs the same bytes.
+struct TraceTask {
+    const Ray* rays;  // as they stand in the scene; 16 bytes aligned
+    const u32* kinds;  // RayKind bits of each; null: all see all
+    Hit* hits;  // of trace_closest, by ray
+    u8* blocked;  // of trace_any: Blocked values, by ray
+    const u32* count;  // rays
+    u32* next;  // 0 when the kernel begins; how many rays were fetched when it ends, at least
+};
+
+__device__ __forceinline__ u32 ray_count(const TraceTask& task) { return __ldg(task.count); }
+__device__ __forceinline__ u32* next_ray(const TraceTask& task) { return task.next; }
+__device__ __forceinline__ u32 kinds_of(const TraceTask& task, u32 i) {
+    return task.kinds ? __ldg(task.kinds + i) : u32(RAY_ALL);
+}
+__device__ __forceinline__ Ray ray_of(const TraceTask& task, u32 i) {
+    const float4* quads = reinterpret_cast<const float4*>(task.rays) + 2 * u64(i);
+    float4 a = __ldg(quads), b = __ldg(quads + 1);
+    return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, b.w};
+}
+__device__ __forceinline__ void store_blocked(const TraceTask& task, u32 i, u8 blocked) { task.blocked[i] = blocked; }
+
+// Calls trace(i) for every ray of the task, a warp's worth at a time.
+template <class Trace>
+__device__ __forceinline__ void for_each_ray(const TraceTask& task, Trace&& trace) {
+    u32 count = ray_count(task), lane = threadIdx.x % 32u;
+    for (;;) {
+        u32 first = 0;
+        if (lane == 0) first = atomicAdd(task.next, 32u);
+        first = __shfl_sync(0xffffffffu, first, 0);
+        if (first >= count) return;
+        if (first + lane < count) trace(first + lane);
+    }
+}
+
+}  // namespace luch
+
+#define LUCH_TRACE_ARGUMENTS const luch::TwoLevelView<LUCH_VIEW> scene, const luch::TraceTask task
+#define LUCH_TRACE_KERNEL(name) extern "C" __global__ void __launch_bounds__(luch::RAY_BLOCK) name

@@ -1,0 +1,3 @@
+#include "luch/accel/brute_force.h"
+#define LUCH_VIEW luch::BruteForce
+#include "render/trace_generic.cuh"

@@ -1,0 +1,3 @@
+#include "luch/accel/bvh2.h"
+#define LUCH_VIEW luch::Bvh2
+#include "render/trace_generic.cuh"

@@ -1,0 +1,3 @@
+#include "luch/accel/bvh2_stackless.h"
+#define LUCH_VIEW luch::Bvh2Stackless
+#include "render/trace_generic.cuh"

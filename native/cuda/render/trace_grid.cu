@@ -1,0 +1,3 @@
+#include "luch/accel/grid.h"
+#define LUCH_VIEW luch::Grid
+#include "render/trace_generic.cuh"

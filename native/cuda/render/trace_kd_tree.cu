@@ -1,0 +1,3 @@
+#include "luch/accel/kd_tree.h"
+#define LUCH_VIEW luch::KdTree
+#include "render/trace_generic.cuh"

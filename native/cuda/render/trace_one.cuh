@@ -1,0 +1,39 @@
+// Scenes that are one group in the world: the persistent kernels of rays/, with hits of the scene.
+#pragma once
+#include "rays/persistent.cuh"
+#include "render/trace.cuh"
+
+namespace luch {
+
+struct OneGroupRays {
+    const TwoLevelView<Cwbvh>& scene;
+    const TraceTask& task;
+};
+
+__device__ __forceinline__ u32 ray_count(const OneGroupRays& rays) { return ray_count(rays.task); }
+__device__ __forceinline__ u32* next_ray(const OneGroupRays& rays) { return rays.task.next; }
+__device__ __forceinline__ bool load_ray(const OneGroupRays& rays, u32 i, Ray* ray) {
+    *ray = ray_of(rays.task, i);
+    bool valid = clamp_interval(ray);
+    return valid && (rays.scene.only_visibility & kinds_of(rays.task, i)) != 0u;
+}
+__device__ __forceinline__ void store_hit(const OneGroupRays& rays, u32 i, const RefHit& hit) {
+    rays.task.hits[i] = hit.ref == NONE ? no_scene_hit() : hit_in_scene(rays.scene.only, NONE, hit);
+}
+__device__ __forceinline__ void store_blocked(const OneGroupRays& rays, u32 i, u8 blocked) {
+    store_blocked(rays.task, i, blocked);
+}
+
+}  // namespace luch
+
+#define LUCH_PERSISTENT_TRACE_KERNEL(name) \
+    extern "C" __global__ void __launch_bounds__(luch::RAY_BLOCK, LUCH_BLOCKS) name
+
+LUCH_PERSISTENT_TRACE_KERNEL(trace_closest_one)(LUCH_TRACE_ARGUMENTS) {
+    luch::trace_persistent<luch::Precision::LUCH_PRECISION, false>(scene.only.structure,
+                                                                   luch::OneGroupRays{scene, task});
+}
+LUCH_PERSISTENT_TRACE_KERNEL(trace_any_one)(LUCH_TRACE_ARGUMENTS) {
+    luch::trace_persistent<luch::Precision::LUCH_PRECISION, true>(scene.only.structure,
+                                                                  luch::OneGroupRays{scene, task});
+}

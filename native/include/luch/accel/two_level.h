@@ -1,0 +1,131 @@
+// The scene's primitives for any device: groups of them, each in a structure of its own, entries that put groups into
+// the world, a compressed wide tree over the entries. The hits are those of cpu/accel/accel.h, bit for bit.
+#pragma once
+#include "luch/accel/cwbvh.h"
+#include "luch/accel/instances.h"
+
+namespace luch {
+
+// A structure, and what its refs mean.
+template <class Structure>
+struct TracedGroup {
+    Structure structure;
+    Primitives primitives;       // empty where the structure's leaves hold them
+    const GroupMember* members;
+    u32 member_count;
+    u32 unused;
+};
+
+template <class Structure>
+struct TwoLevelView {
+    CwbvhOf<GroupEntry> top;               // none where all is one group
+    const TracedGroup<Structure>* groups;
+    EntryError error;
+    TracedGroup<Structure> only;           // the one group in the world that is all of the scene,
+    u32 only_visibility;                   // by RayKind; 0: take the top
+    u32 group_count;
+};
+
+template <class Structure>
+LUCH_FN Hit hit_in_scene(const TracedGroup<Structure>& group, u32 instance, const RefHit& hit) {
+    const GroupMember member = member_of(group.members, group.member_count, hit.ref);
+    return {hit.t, member.prim_of(hit.ref), instance == NONE ? member.instance : instance, hit.u, hit.v};
+}
+
+// A ray of the scene in an entry's group, or false.
+LUCH_FN bool enter_entry(const GroupEntry& entry, const Ray& ray, u32 kinds, float t_max, Ray* inside) {
+    if (!(entry.visibility & kinds)) return false;
+    if (entry.instance == NONE)
+        *inside = ray;
+    else if (!enter_instance(entry.to_object, ray, inside))
+        return false;
+    inside->t_min = ray.t_min;
+    inside->t_max = t_max;
+    return true;
+}
+
+// The ray with the interval that structures take: 0 <= t_min, t_max a number. False if it can hit nothing.
+LUCH_FN bool clamp_interval(Ray* ray) {
+    bool valid = ray_is_valid(*ray);
+    ray->t_min = max_f(ray->t_min, 0.0f);
+    ray->t_max = min_f(ray->t_max, LARGEST_DISTANCE);
+    return valid;
+}
+
+template <class Structure>
+LUCH_FN WideRay top_ray(const TwoLevelView<Structure>& scene, const Ray& ray) {
+    return make_wide_ray(ray, scene.top.root, widening(scene.error, ray.origin));
+}
+
+template <Precision P, class Structure>
+struct ClosestOfEntries {
+    const TwoLevelView<Structure>& scene;
+    const Ray& ray;
+    u32 kinds;
+    Hit best;
+    LUCH_FN float t_max() const { return best.t; }
+    LUCH_FN bool operator()(const GroupEntry& entry) {
+        Ray inside;
+        if (!enter_entry(entry, ray, kinds, best.t, &inside)) return false;
+        const TracedGroup<Structure>& group = scene.groups[entry.group];
+        NoCounters none;
+        RefHit found = {best.t, NONE, 0.0f, 0.0f};
+        closest_hit<P>(group.structure, group.primitives, inside, &found, none);
+        if (found.ref == NONE) return false;
+        Hit hit = hit_in_scene(group, entry.instance, found);
+        if (comes_first(hit, best)) best = hit;
+        return false;
+    }
+};
+template <Precision P, class Structure>
+struct AnyOfEntries {
+    const TwoLevelView<Structure>& scene;
+    const Ray& ray;
+    u32 kinds;
+    u8 blocked;
+    LUCH_FN float t_max() const { return ray.t_max; }
+    LUCH_FN bool operator()(const GroupEntry& entry) {
+        Ray inside;
+        if (!enter_entry(entry, ray, kinds, ray.t_max, &inside)) return false;
+        const TracedGroup<Structure>& group = scene.groups[entry.group];
+        NoCounters none;
+        if (u8 found = any_hit<P>(group.structure, group.primitives, inside, none)) blocked = found;
+        return blocked == BLOCKED_OPAQUE;
+    }
+};
+
+// The ray as it stands in the scene; it sees the instances that share a bit with kinds.
+template <Precision P, class Structure>
+LUCH_FN Hit closest_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 kinds) {
+    Ray ray = given;
+    if (!clamp_interval(&ray)) return no_scene_hit();
+    NoCounters none;
+    if (scene.only_visibility != 0u) {
+        RefHit found = {ray.t_max, NONE, 0.0f, 0.0f};
+        if (scene.only_visibility & kinds)
+            closest_hit<P>(scene.only.structure, scene.only.primitives, ray, &found, none);
+        return found.ref == NONE ? no_scene_hit() : hit_in_scene(scene.only, NONE, found);
+    }
+    ClosestOfEntries<P, Structure> entries = {scene, ray, kinds, {ray.t_max, NONE, NONE, 0.0f, 0.0f}};
+    LocalStack<> stack;
+    walk(scene.top, top_ray(scene, ray), stack, entries, none);
+    return entries.best.prim == NONE ? no_scene_hit() : entries.best;
+}
+
+// A Blocked value.
+template <Precision P, class Structure>
+LUCH_FN u8 any_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 kinds) {
+    Ray ray = given;
+    if (!clamp_interval(&ray)) return BLOCKED_NOT;
+    NoCounters none;
+    if (scene.only_visibility != 0u) {
+        if (!(scene.only_visibility & kinds)) return BLOCKED_NOT;
+        return any_hit<P>(scene.only.structure, scene.only.primitives, ray, none);
+    }
+    AnyOfEntries<P, Structure> entries = {scene, ray, kinds, BLOCKED_NOT};
+    LocalStack<> stack;
+    walk(scene.top, top_ray(scene, ray), stack, entries, none);
+    return entries.blocked;
+}
+
+}  // namespace luch

@@ -1,0 +1,102 @@
+"""The kernels that trace a render's rays give the CPU's hits, bit for bit.
+
+Each test runs twice: on a GPU (marker `cuda`; tests/bench/records tells when last), and anywhere with the kernels'
+source run by fibers on the CPU, which proves their logic and the Python around them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from luch.accel import STRUCTURES
+from luch.cuda.trace import SceneTracer
+from support import cuda_on_cpu
+from support.accel_meshes import random_rays, rows, soup
+from support.instances import ALL, Scene, crowd
+
+from buildtools.kernels import faults, table
+
+FIBERS, GPU = "fibers", "cuda"
+PRECISIONS = ("FAST", "WATERTIGHT", "DOUBLE")
+
+
+@pytest.fixture(scope="module", params=[FIBERS, pytest.param(GPU, marks=pytest.mark.cuda)])
+def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Where the kernels run."""
+    if request.param == GPU:
+        yield GPU
+        return
+    with cuda_on_cpu.standing_in(tmp_path_factory.mktemp("kernels")):
+        yield FIBERS
+
+
+def check_equal(scene: Scene, rays: Any, kinds: Any, kind: str, flatten: int, precision: str = "WATERTIGHT") -> Any:
+    """Compares with the CPU's scheme; returns its hits."""
+    oracle = scene.build("BVH", flatten, PRECISIONS.index(precision))
+    trees = scene.trees(kind, flatten, PRECISIONS.index(precision))
+    tracer = SceneTracer(*trees.device_image(), kind, precision, trees.is_one_group())
+    truth = oracle.closest(rays, kinds)
+    hits = tracer.closest_of(rays, kinds)
+    for name, expected in zip(("t", "prim", "u", "v", "instance"), truth, strict=True):
+        differ = np.flatnonzero(np.ascontiguousarray(hits[name]).view(np.uint32) != expected.view(np.uint32))
+        assert not len(differ), f"{name} of {len(differ)} rays, first {differ[0]}"
+    assert np.array_equal(tracer.any_of(rays, kinds), oracle.any(rays, kinds))
+    return truth
+
+
+def mixed_rays(place: str, seed: int = 5) -> tuple[Any, Any]:
+    """Rays that go together, rays that do not, some that can hit nothing; and of which kinds they are."""
+    rng = np.random.default_rng(seed)
+    spread = 0.2 * np.stack(np.meshgrid(np.linspace(-1, 1, 8), np.linspace(-1, 1, 8)), -1).reshape(-1, 2)
+    rays = np.concatenate(
+        [
+            rows(np.array([0, 0, -9.0]), np.insert(spread, 2, 1.0, axis=1)),
+            random_rays(30_000 if place == GPU else 150, scale=3.0),
+        ]
+    )
+    rays[::7, 7] = np.linspace(0.1, 9, len(rays[::7]))
+    rays[::11, 3] = 0.3
+    rays[3, 4:7], rays[4, 0], rays[5, 7], rays[6, 3], rays[8, 3] = 0, np.nan, -1, np.nan, -5
+    return rays, (1 << rng.integers(6, size=len(rays))).astype(np.uint32)
+
+
+def hidden(scene: Scene, seed: int = 8) -> Scene:
+    """The same, each instance unseen by some kinds of rays and a third of the triangles perhaps transparent."""
+    rng = np.random.default_rng(seed)
+    scene.instances = [(m, matrix, int(rng.integers(64))) for m, matrix, _ in scene.instances]
+    scene.flags = (rng.random(sum(len(t) for _, t in scene.meshes)) < 0.3).astype(np.uint8)
+    return scene
+
+
+@pytest.mark.parametrize("kind", STRUCTURES)
+@pytest.mark.parametrize("flatten", [0, 10_000_000])
+def test_every_structure_serves_instances_on_the_device(place: str, kind: str, flatten: int) -> None:
+    rays, kinds = mixed_rays(place)
+    truth = check_equal(hidden(crowd(12, spread=2.0)), rays, kinds, kind, flatten)
+    assert (truth[1] >= 0).sum() > 20
+
+
+@pytest.mark.parametrize("precision", ["WATERTIGHT", "DOUBLE"])
+@pytest.mark.parametrize(("count", "flatten"), [(1, 0), (1, 10_000_000), (40, 0), (40, 40_000), (40, 10_000_000)])
+def test_the_compressed_tree_serves_few_and_many(place: str, count: int, flatten: int, precision: str) -> None:
+    rays, kinds = mixed_rays(place, count)
+    scene = crowd(count, spread=3.0)
+    check_equal(scene, rays, np.full(len(rays), ALL, np.uint32), "CWBVH", flatten, precision)
+    check_equal(hidden(scene), rays, kinds, "CWBVH", flatten, precision)
+
+
+def test_nothing_to_hit_and_no_rays_are_answered(place: str) -> None:
+    empty = Scene([soup(3)], [])
+    rays, kinds = mixed_rays(place)
+    assert (check_equal(empty, rays, kinds, "CWBVH", 0)[1] == -1).all()
+    check_equal(crowd(9), rays[:0], kinds[:0], "CWBVH", 0)
+
+
+def test_fibers_and_ptx_obey_the_rules_of_precision() -> None:
+    assert set(table()["tracers"]) == {f"TRACE_{kind}" for kind in STRUCTURES}
+    assert not faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f32")
+    assert faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f64")
+    assert faults(("TRACE_CWBVH", "FAST"), "mul.f64")
