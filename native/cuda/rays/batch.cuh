@@ -38,11 +38,6 @@ __device__ __forceinline__ void store_hit(const RayBatch& batch, u32 i, const Re
     batch.v[i] = hit.v;
 }
 
-__device__ __forceinline__ void store_blocked(const RayBatch& batch, u32 i, u8 blocked) { batch.blocked[i] = blocked; }
-
-__device__ __forceinline__ u32 ray_count(const RayBatch& batch) { return batch.count; }
-__device__ __forceinline__ u32* next_ray(const RayBatch& batch) { return batch.next; }
-
 __device__ __forceinline__ void add_counters(const RayBatch& batch, const Counters& kept) {
     atomicAdd(batch.counters + 0, kept.nodes);
     atomicAdd(batch.counters + 1, kept.boxes);

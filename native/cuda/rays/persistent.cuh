@@ -2,7 +2,8 @@
 // first entries of each stack in shared memory, leaves that wait until enough lanes of the warp are at one (Aila,
 // Laine 2009; Ylitie, Karras, Laine 2017). What is computed is luch/accel/cwbvh.h's: the same hits in any order.
 //
-// Rays: where rays come from and results go, with ray_count, next_ray, load_ray, store_hit and store_blocked of its own.
+// Rays: a tree, where its rays come from and results go: with tree_of, ray_count, next_ray, load_ray, store_hit and
+// store_blocked of its own.
 #pragma once
 #include "rays/structure.cuh"
 
@@ -103,13 +104,14 @@ struct Aside {
 };
 // Asides lie an odd number of 8-byte words apart: lanes that read the same member then meet in no bank. At 96 bytes,
 // without the odd word, eight lanes would meet in each.
-template <Precision P>
-inline constexpr u32 ASIDE_WORDS = u32(sizeof(Aside<P>) / sizeof(u64)) | u32(LUCH_ODD_ASIDES);
+template <class Kept>
+inline constexpr u32 ASIDE_WORDS = u32(sizeof(Kept) / sizeof(u64)) | u32(LUCH_ODD_ASIDES);
 
 // One lane's ray on its way.
 template <Precision P, bool ANY>
 struct Walker {
-    Aside<P>* aside;
+    using Kept = Aside<P>;
+    Kept* aside;
     WideRay wide;
     float last;
     WaitingGroup group;
@@ -118,7 +120,8 @@ struct Walker {
 
     // Takes the ray with that index, or answers it at once.
     template <class Rays>
-    __device__ __forceinline__ void begin(const Cwbvh& tree, const Rays& rays, u32 i, SplitStack* stack) {
+    __device__ __forceinline__ void begin(const Rays& rays, u32 i, SplitStack* stack) {
+        const Cwbvh& tree = tree_of(rays);
         Ray ray;
         busy = load_ray(rays, i, &ray) && tree.node_count != 0;
         aside->index = i;
@@ -141,7 +144,8 @@ struct Walker {
             store_hit(rays, aside->index, aside->best);
     }
     // Visits the next child of the group, or takes its primitives; returns those that the ray may hit.
-    __device__ __forceinline__ WaitingGroup visit(const Cwbvh& tree, SplitStack* stack) {
+    template <class Rays>
+    __device__ __forceinline__ WaitingGroup visit(const Rays& rays, SplitStack* stack) {
         if (!has_nodes(group)) {
             WaitingGroup leaves = group;
             group.hits = 0;
@@ -151,16 +155,17 @@ struct Walker {
         u32 child = group.first + u32(popcount(group.hits & 0xffu & ~(~0u << place)));
         group.hits &= ~(1u << bit);
         if (has_nodes(group)) stack->push(group);
-        const CwbvhNode node = load_quads(tree.nodes + child);
+        const CwbvhNode node = load_quads(tree_of(rays).nodes + child);
         u32 hits = intersect_children(node, wide, last);
         group = {node.first_child, (hits & 0xff000000u) | node.exponents >> 24};
         return {node.first_leaf, hits & 0x00ffffffu};
     }
     // Tests one of the primitives; true when nothing else can matter.
-    __device__ __forceinline__ bool test(const Cwbvh& tree, WaitingGroup* leaves) {
+    template <class Rays>
+    __device__ __forceinline__ bool test(const Rays& rays, WaitingGroup* leaves) {
         u32 bit = u32(highest_bit(leaves->hits));
         leaves->hits &= ~(1u << bit);
-        const LeafPrimitive p = load_quads(tree.leaves + leaves->first + bit);
+        const LeafPrimitive p = load_quads(tree_of(rays).leaves + leaves->first + bit);
         NoCounters none;
         TriangleHit hit;
         RefHit best = aside->best;
@@ -175,6 +180,14 @@ struct Walker {
         last = wide.upper(hit.t);
         return false;
     }
+    // When the group has no more nodes.
+    template <class Rays>
+    __device__ __forceinline__ void take_waiting(const Rays& rays, SplitStack* stack) {
+        if (stack->size == 0)
+            finish(rays);
+        else
+            group = stack->pop();
+    }
 };
 
 // Whether all lanes have just begun rays that go nearly the same way (within 11 degrees of the first lane's): they will
@@ -188,9 +201,9 @@ __device__ __forceinline__ bool go_together(Vec3 direction, bool fresh) {
 }
 
 // All lanes call it with theirs: tests them together, or puts them on the stacks while few lanes have any.
-template <class Rays, Precision P, bool ANY>
-__device__ __forceinline__ void test_leaves(const Cwbvh& tree, const Rays& rays, Walker<P, ANY>& walker,
-                                            SplitStack* stack, WaitingGroup leaves, bool together) {
+template <class Walk, class Rays>
+__device__ __forceinline__ void test_leaves(const Rays& rays, Walk& walker, SplitStack* stack, WaitingGroup leaves,
+                                            bool together) {
     u32 busy = u32(__popc(__ballot_sync(ALL_LANES, walker.busy)));
     for (;;) {
         u32 at_leaf = u32(__popc(__ballot_sync(ALL_LANES, leaves.hits != 0)));
@@ -199,27 +212,29 @@ __device__ __forceinline__ void test_leaves(const Cwbvh& tree, const Rays& rays,
             if (leaves.hits != 0) stack->push(leaves);
             return;
         }
-        if (leaves.hits != 0 && walker.test(tree, &leaves)) {
+        if (leaves.hits != 0 && walker.test(rays, &leaves)) {
             walker.finish(rays);
             leaves.hits = walker.group.hits = 0;
         }
     }
 }
 
-template <Precision P, bool ANY, class Rays>
-__device__ __forceinline__ void trace_persistent(const Cwbvh& tree, const Rays& rays) {
+// Walk: Walker, or one that does as it does.
+template <class Walk, class Rays>
+__device__ __forceinline__ void trace_persistent(const Rays& rays) {
+    using Kept = typename Walk::Kept;
     __shared__ u64 columns[SHARED_ENTRIES * RAY_BLOCK];
-    __shared__ u64 asides[RAY_BLOCK * ASIDE_WORDS<P>];
-    static_assert(sizeof(Aside<P>) % sizeof(u64) == 0);
+    __shared__ u64 asides[RAY_BLOCK * ASIDE_WORDS<Kept>];
+    static_assert(sizeof(Kept) % sizeof(u64) == 0);
     u64 local[2 * CWBVH_MAX_DEPTH - SHARED_ENTRIES];
     SplitStack stack = {columns + threadIdx.x, local, 0};
-    Walker<P, ANY> walker;
-    walker.aside = reinterpret_cast<Aside<P>*>(asides + threadIdx.x * ASIDE_WORDS<P>);
+    Walk walker;
+    walker.aside = reinterpret_cast<Kept*>(asides + threadIdx.x * ASIDE_WORDS<Kept>);
     walker.busy = false;
     RayPool pool;
     for (;;) {
         u32 index = pool.give(rays, !walker.busy);
-        if (index != NONE) walker.begin(tree, rays, index, &stack);
+        if (index != NONE) walker.begin(rays, index, &stack);
         bool together = go_together(walker.aside->tested.direction, index != NONE && walker.busy);
         u32 lost = 0;
         for (;;) {
@@ -228,13 +243,10 @@ __device__ __forceinline__ void trace_persistent(const Cwbvh& tree, const Rays& 
             lost += idle > SPARE_LANES ? idle - SPARE_LANES : 0u;
             if (lost > LOST_LANE_STEPS && !together && !pool.exhausted) break;
             WaitingGroup leaves = {0, 0};
-            if (walker.busy) leaves = walker.visit(tree, &stack);
-            test_leaves(tree, rays, walker, &stack, leaves, together);
+            if (walker.busy) leaves = walker.visit(rays, &stack);
+            test_leaves(rays, walker, &stack, leaves, together);
             if (!walker.busy || has_nodes(walker.group)) continue;
-            if (stack.size == 0)
-                walker.finish(rays);
-            else
-                walker.group = stack.pop();
+            walker.take_waiting(rays, &stack);
         }
         if (pool.exhausted && !__ballot_sync(ALL_LANES, walker.busy)) return;
     }

@@ -2,7 +2,7 @@
 //
 // A module has trace_closest and trace_any: BLOCK of luch/cuda/trace.py threads a block, as many blocks as fit at once;
 // warps fetch rays until there are none. That of the compressed wide tree has trace_closest_one and trace_any_one too,
-// for scenes that are one group in the world.
+// for scenes that are one group in the world, and trace_closest_simple and trace_any_simple, which the race compares.
 #pragma once
 #include "luch/accel/two_level.h"
 #include "rays/structure.cuh"
@@ -42,6 +42,15 @@ __device__ __forceinline__ void for_each_ray(const TraceTask& task, Trace&& trac
         if (first >= count) return;
         if (first + lane < count) trace(first + lane);
     }
+}
+
+template <Precision P, class View>
+__device__ __forceinline__ void trace_closest_simple(const TwoLevelView<View>& scene, const TraceTask& task) {
+    for_each_ray(task, [&](u32 i) { task.hits[i] = closest_hit<P>(scene, ray_of(task, i), kinds_of(task, i)); });
+}
+template <Precision P, class View>
+__device__ __forceinline__ void trace_any_simple(const TwoLevelView<View>& scene, const TraceTask& task) {
+    for_each_ray(task, [&](u32 i) { task.blocked[i] = any_hit<P>(scene, ray_of(task, i), kinds_of(task, i)); });
 }
 
 }  // namespace luch

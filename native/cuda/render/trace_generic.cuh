@@ -4,14 +4,8 @@
 #include "render/trace.cuh"
 
 LUCH_TRACE_KERNEL(trace_closest)(LUCH_TRACE_ARGUMENTS) {
-    luch::for_each_ray(task, [&](luch::u32 i) {
-        task.hits[i] =
-            luch::closest_hit<luch::Precision::LUCH_PRECISION>(scene, luch::ray_of(task, i), luch::kinds_of(task, i));
-    });
+    luch::trace_closest_simple<luch::Precision::LUCH_PRECISION>(scene, task);
 }
 LUCH_TRACE_KERNEL(trace_any)(LUCH_TRACE_ARGUMENTS) {
-    luch::for_each_ray(task, [&](luch::u32 i) {
-        task.blocked[i] =
-            luch::any_hit<luch::Precision::LUCH_PRECISION>(scene, luch::ray_of(task, i), luch::kinds_of(task, i));
-    });
+    luch::trace_any_simple<luch::Precision::LUCH_PRECISION>(scene, task);
 }

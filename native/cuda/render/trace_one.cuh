@@ -10,6 +10,7 @@ struct OneGroupRays {
     const TraceTask& task;
 };
 
+__device__ __forceinline__ const Cwbvh& tree_of(const OneGroupRays& rays) { return rays.scene.only.structure; }
 __device__ __forceinline__ u32 ray_count(const OneGroupRays& rays) { return ray_count(rays.task); }
 __device__ __forceinline__ u32* next_ray(const OneGroupRays& rays) { return rays.task.next; }
 __device__ __forceinline__ bool load_ray(const OneGroupRays& rays, u32 i, Ray* ray) {
@@ -25,15 +26,3 @@ __device__ __forceinline__ void store_blocked(const OneGroupRays& rays, u32 i, u
 }
 
 }  // namespace luch
-
-#define LUCH_PERSISTENT_TRACE_KERNEL(name) \
-    extern "C" __global__ void __launch_bounds__(luch::RAY_BLOCK, LUCH_BLOCKS) name
-
-LUCH_PERSISTENT_TRACE_KERNEL(trace_closest_one)(LUCH_TRACE_ARGUMENTS) {
-    luch::trace_persistent<luch::Precision::LUCH_PRECISION, false>(scene.only.structure,
-                                                                   luch::OneGroupRays{scene, task});
-}
-LUCH_PERSISTENT_TRACE_KERNEL(trace_any_one)(LUCH_TRACE_ARGUMENTS) {
-    luch::trace_persistent<luch::Precision::LUCH_PRECISION, true>(scene.only.structure,
-                                                                  luch::OneGroupRays{scene, task});
-}
