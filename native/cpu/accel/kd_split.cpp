@@ -11,6 +11,15 @@ constexpr u32 LANES = 16;
 typedef float Floats __attribute__((vector_size(4 * LANES)));
 typedef i32 Ints __attribute__((vector_size(4 * LANES)));
 
+// AVX-512 compares into a mask, by which it can add; others get -1 in every lane where it is true.
+inline Ints one_more_where(Ints is_true, Ints count) {
+#if defined(__AVX512F__)
+    return is_true ? count + 1 : count;
+#else
+    return count - is_true;
+#endif
+}
+
 // The least cost seen so far among the planes of a cell, in units of PRIMITIVE_COST per half of the cell's area.
 class Best {
  public:
@@ -115,9 +124,10 @@ KdPlane choose_exact_plane(const KdRef* refs, u32 count, const Box& cell, u64 mo
     Vec3 size = extent * unit;
     if (!finite_f(unit) || count == 0) return {-1, 0.0f};
     float half_area = size.x * size.y + size.y * size.z + size.z * size.x;
-    float step = float(STEP_COST / PRIMITIVE_COST) * half_area, least = half_area * float(count);
+    float step = float(STEP_COST / PRIMITIVE_COST) * half_area, leaf_cost = half_area * float(count);
     i32 most_sides = i32(most_cut < KD_MOST_EXACT ? most_cut : KD_MOST_EXACT) + i32(count);
-    KdPlane found = {-1, 0.0f};
+    Floats least_cost = Floats{} + leaf_cost, best_plane = {};  // of the planes that a lane has seen
+    Ints best_axis = Ints{} - 1;
     for (int axis = 0; axis < 3; ++axis) {
         float first = cell.lo[axis], last = cell.hi[axis], length = size[axis];
         float u = size[axis == 0 ? 1 : 0], v = size[axis == 2 ? 1 : 2], across = u * v, around = u + v;
@@ -129,13 +139,12 @@ KdPlane choose_exact_plane(const KdRef* refs, u32 count, const Box& cell, u64 mo
             planes[2 * i / LANES][2 * i % LANES] = lo[i];
             planes[2 * i / LANES][2 * i % LANES + 1] = hi[i];
         }
-        Floats least_cost = Floats{} + least, best_plane = {};
         for (u32 b = 0; b < blocks; ++b) {
             Floats plane = planes[b];
             Ints below = {}, above = {};
             for (u32 i = 0; i < count; ++i) {
-                below -= lo[i] < plane;  // true is -1
-                above -= hi[i] > plane;
+                below = one_more_where(lo[i] < plane, below);
+                above = one_more_where(hi[i] > plane, above);
             }
             Floats under = __builtin_convertvector(below, Floats), over = __builtin_convertvector(above, Floats);
             Floats x = (plane - first) * unit;
@@ -144,14 +153,15 @@ KdPlane choose_exact_plane(const KdRef* refs, u32 count, const Box& cell, u64 mo
             Ints better = (plane > first) & (plane < last) & (below + above <= most_sides) & (cost < least_cost);
             least_cost = better ? cost : least_cost;
             best_plane = better ? plane : best_plane;
+            best_axis = better ? axis : best_axis;
         }
-        for (u32 k = 0; k < LANES; ++k)
-            if (least_cost[k] < least) {
-                least = least_cost[k];
-                found = {axis, best_plane[k]};
-            }
     }
-    return found;
+    u32 best = 0;  // of equal ones the lower axis
+    for (u32 k = 1; k < LANES; ++k)
+        if (least_cost[k] < least_cost[best] ||
+            (least_cost[k] == least_cost[best] && u32(best_axis[k]) < u32(best_axis[best])))
+            best = k;
+    return {best_axis[best], best_plane[best]};
 }
 
 }  // namespace luch::cpu
