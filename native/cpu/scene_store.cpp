@@ -1,5 +1,6 @@
 #include "cpu/scene_store.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -79,6 +80,35 @@ bool invert_affine(const double* m, double* inverse) {
     return true;
 }
 
+// Of the three cross products of rows (step 4, next 1) or columns (step 1, next 4), the longest, made unit.
+std::array<double, 3> longest_cross(const double* m, int next, int step) {
+    std::array<double, 3> best{};
+    double longest = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double *a = m + i * step, *b = m + (i + 1) % 3 * step;
+        std::array<double, 3> c = {a[next] * b[2 * next] - a[2 * next] * b[next],
+                                   a[2 * next] * b[0] - a[0] * b[2 * next], a[0] * b[next] - a[next] * b[0]};
+        double length = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+        if (!(length > longest)) continue;
+        longest = length;
+        best = {c[0] / length, c[1] / length, c[2] / length};
+    }
+    return best;
+}
+
+// A matrix that flattens (a scale of 0) has no inverse: it is given this thickness, as a share of its size.
+constexpr double FLAT_THICKNESS = 1e-5;
+
+// Adds a scale along the one direction that the matrix loses, to the normal of the plane that it leaves.
+void thicken(double* m) {
+    double size = 0.0;
+    for (int i = 0; i < 12; i++) size = i % 4 == 3 ? size : std::max(size, std::abs(m[i]));
+    std::array<double, 3> lost = longest_cross(m, 1, 4), normal = longest_cross(m, 4, 1);
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            m[row * 4 + column] += FLAT_THICKNESS * size * normal[row] * lost[column];
+}
+
 Affine to_affine(const double* m) {
     Affine a;
     for (int i = 0; i < 12; i++) a.m[i] = float(m[i]);
@@ -152,18 +182,21 @@ u32 SceneStore::add_object(const ObjectInput& input) {
 }
 
 bool SceneStore::add_instance(const InstanceInput& input) {
-    double inverse[12] = {};
-    if (!invert_affine(input.matrix, inverse)) return false;
+    double inverse[12] = {}, m[12];
+    std::copy(input.matrix, input.matrix + 12, m);
+    if (!invert_affine(m, inverse)) {
+        thicken(m);
+        if (!invert_affine(m, inverse)) return false;
+    }
     const ObjectInput& object = object_inputs_.at(input.object);
     InstanceView instance{};
-    instance.to_world = to_affine(input.matrix);
+    instance.to_world = to_affine(m);
     instance.to_object = to_affine(inverse);
     instance.mesh = object.mesh;
     instance.object = input.object;
     instance.first_material = object_first_material_[input.object];
     instance.material_count = u32(object.materials.size());
     instance.visibility = object.visibility;
-    const double* m = input.matrix;
     double determinant =
         m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
     instance.flags = (object.holdout ? INSTANCE_HOLDOUT : 0u) | (object.shadow_catcher ? INSTANCE_SHADOW_CATCHER : 0u) |

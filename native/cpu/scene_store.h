@@ -63,7 +63,8 @@ class SceneStore {
     // Throws std::invalid_argument, naming the mesh, for an index out of range or sizes that do not agree.
     void add_mesh(const MeshInput& input);
     u32 add_object(const ObjectInput& input);
-    // False when the matrix is not finite or cannot be inverted: such an instance is not drawn.
+    // A matrix that flattens to a plane gets a little thickness. False when it is not finite or leaves only a line or
+    // a point: such an instance is not drawn.
     bool add_instance(const InstanceInput& input);
     // The source's maps must already hold the scene's numbers (attribute_id for attributes).
     Program add_program(const ProgramSource& source) { return programs_.add(source); }

@@ -117,3 +117,23 @@ def test_generated_coordinates_of_a_deformed_mesh_are_the_same(
         grid.modifiers.new("Smooth", "SUBSURF").render_levels = 2
     look_down(scene, 3.0)
     assert_same_picture(render)
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 0.0), (1.0, 0.0, 1.0), (0.0, 1.0, 0.0)])
+@pytest.mark.parametrize(("node", "output"), [("ShaderNodeNewGeometry", "Normal"), ("ShaderNodeTexCoord", "UV")])
+def test_an_object_scaled_to_nothing_is_drawn_flat(
+    scene: bpy.types.Scene, render: Render, scale: tuple[float, float, float], node: str, output: str
+) -> None:
+    """Its matrix has no inverse. Scaled to a line it leaves nothing, and the floor shows."""
+    bpy.ops.mesh.primitive_plane_add(size=9.0)
+    bpy.context.object.data.materials.append(show("ShaderNodeTexCoord", "Generated"))
+    upright = scale[1] == 0.0
+    bpy.ops.mesh.primitive_grid_add(rotation=(1.5 if upright else 0.3, 0.2, 0.4), location=(0.2, 0.1, 1.0))
+    grid = bpy.context.object
+    grid.scale = scale
+    if upright:
+        for vertex in grid.data.vertices:
+            vertex.co.yz = 0.0, vertex.co.y
+    grid.data.materials.append(show(node, output))
+    look_down(scene, 3.0)
+    assert_same_picture(render, edge_share=0.02)
