@@ -144,7 +144,10 @@ void SceneStore::add_mesh(const MeshInput& input) {
     positions_.insert(positions_.end(), input.positions, input.positions + input.vertex_count * 3);
     triangles_.insert(triangles_.end(), input.triangles, input.triangles + input.triangle_count * 3);
     material_slots_.insert(material_slots_.end(), input.material_slots, input.material_slots + input.triangle_count);
-    spheres_.insert(spheres_.end(), input.spheres, input.spheres + input.sphere_count * 4);
+    for (size_t i = 0; i < input.sphere_count; i++) {
+        const float* s = input.spheres + 4 * i;
+        spheres_.insert(spheres_.end(), {s[0], s[1], s[2], -s[3]});  // below zero: only its outside is there
+    }
     if (input.normals) {
         normals_.insert(normals_.end(), input.normals, input.normals + rows_of(input.normals_domain, input) * 3);
     }

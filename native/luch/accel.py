@@ -34,8 +34,8 @@ _ALL_KINDS = np.zeros(0, np.uint32)  # no mask: every ray sees everything
 class Accel:
     """Triangles and spheres that rays can be traced through.
 
-    positions: (V, 3) float32. triangles: (T, 3) uint32 vertex indices. spheres: (S, 4) float32, centre and radius;
-    sphere k is primitive T + k. kind: the structure; "BVH" is the eight-wide tree, "BRUTE_FORCE" every primitive in
+    positions: (V, 3) float32. triangles: (T, 3) uint32 vertex indices. spheres: (S, 4) float32, centre and radius
+    (below zero: only the outside of such a ball is hit); sphere k is primitive T + k. kind: the structure; "BVH" is the eight-wide tree, "BRUTE_FORCE" every primitive in
     turn: the oracle, and for tiny meshes. precision: "FAST" (single precision), "WATERTIGHT" (no ray slips between
     two triangles that share an edge) or "DOUBLE". quality of the build: "FAST", "NORMAL" or "HIGH".
     may_be_transparent: (T + S,) bool, for `blocked`. threads: 0 is all processors. device: "CUDA" takes rays from

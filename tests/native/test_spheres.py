@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from luch.accel import KINDS
+from luch.accel import KINDS, Accel, Kind
 from luch.render import Result, render
 from luch.scene import Attribute, Camera, Film, Instances, Light, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder
 from numpy.typing import NDArray
-from support.accel_meshes import icosphere
+from support.accel_meshes import icosphere, random_rays
 from support.effects import closure, program
 
 F32 = NDArray[np.float32]
@@ -128,6 +128,27 @@ def test_in_double_precision_the_picture_holds_the_same_surfaces(truth: dict[str
     hit = np.isfinite(truth["Depth"]) & (truth["Depth"] < 1e9)
     ours = rendered(scene).passes["Depth"]
     assert np.allclose(ours[hit], truth["Depth"][hit], rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_of_a_negative_radius_only_the_outside_is_there(kind: Kind) -> None:
+    rng = np.random.default_rng(8)
+    centers = np.stack(np.meshgrid(*[np.arange(4.0) - 1.5] * 3), -1).reshape(-1, 3)  # they keep apart
+    spheres = np.concatenate([centers, rng.uniform(0.2, 0.45, (64, 1))], axis=1).astype(np.float32)
+    outsides = spheres * np.float32([1, 1, 1, -1])
+    none = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)
+    both, one = (Accel(*none, kind=kind, spheres=balls) for balls in (spheres, outsides))
+    rays = random_rays(2000)
+    inside = (np.linalg.norm(rays[:, None, :3] - spheres[:, :3], axis=2) < spheres[:, 3]).any(axis=1)
+    assert 0 < inside.sum() < 1000
+    for of_both, of_one in zip(both.closest(rays[~inside]), one.closest(rays[~inside]), strict=True):
+        assert np.array_equal(of_both, of_one)
+    rays[:, :3], rays[:, 7] = spheres[rng.integers(0, 64, 2000), :3], 0.1  # from a centre, too short to get out
+    assert not one.any(rays).any()
+    rays[:, 7] = np.inf
+    lonely = Accel(*none, kind=kind, spheres=outsides[:1])
+    rays[:, :3] = outsides[0, :3]
+    assert not lonely.any(rays).any() and (lonely.closest(rays)[1] == -1).all()
 
 
 SIZES = [(0.0, 1.0), (0.0, 1e-6), (0.0, 1e6), (1e4, 1.0), (1e4, 0.05), (1e6, 100.0)]

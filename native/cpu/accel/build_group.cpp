@@ -47,7 +47,7 @@ class Gather {
     // False for a sphere that is not finite or has no size.
     bool read(u32 ref, const Member& member, Sphere* out) const {
         const float* s = sphere_at(scene_, scene_.meshes[member.mesh], member.prim_of(ref));
-        *out = {{s[0], s[1], s[2]}, abs_f(s[3])};
+        *out = {{s[0], s[1], s[2]}, s[3]};
         return sphere_can_be_traced(*out);
     }
     bool read_box(u32 ref, const Member& member, Box* out) const {
@@ -181,7 +181,6 @@ StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Ga
             if (group.of_spheres) {
                 Sphere s;
                 gather.read(ref, group.member_of(ref), &s);
-                s.radius = -s.radius;  // its outside alone
                 std::copy_n(&s.center.x, 4, group.spheres.data() + 4 * size_t(ref));
                 continue;
             }

@@ -44,7 +44,7 @@ static_assert(sizeof(Block4) == 160);
 // Eight spheres. Empty lanes have radius 0, which is never hit.
 struct alignas(32) SphereBlock {
     float center[3][8];
-    float radius[8];  // positive
+    float radius[8];  // as Sphere's
     u32 ref[8];
 };
 static_assert(sizeof(SphereBlock) == 160);

@@ -44,7 +44,8 @@ LUCH_FN u32 line_may_touch(const SphereBlock& block, const SphereBlockRay<P>& ra
         f8 p = f[axis] - s * ray.direction[axis];
         distance2 += p * p;
     }
-    f8 limit = load<f8>(block.radius) * (1.0f + 8.0f * EPS) + reach * SPHERE_SLACK;
+    f8 radius = load<f8>(block.radius);
+    f8 limit = max_of(radius, -radius) * (1.0f + 8.0f * EPS) + reach * SPHERE_SLACK;
     f8 limit2 = limit * limit + 1e-43f;  // denormal squares have few digits
     // Where a square overflowed or is NaN, the test decides.
     return ~(mask_le(limit2, distance2) & mask_le(distance2, splat<f8>(3.402823466e+38f))) & 255u;
@@ -53,8 +54,8 @@ LUCH_FN u32 line_may_touch(const SphereBlock& block, const SphereBlockRay<P>& ra
 template <Precision P>
 LUCH_FN bool hit_sphere(const SphereBlock& block, u32 lane, const SphereBlockRay<P>& ray, float t_max, float* t) {
     Vec3 center = {block.center[0][lane], block.center[1][lane], block.center[2][lane]};
-    Sphere outside = {center, -block.radius[lane]};
-    return intersect_sphere<P>(ray.exact_origin, ray.exact_direction, outside, ray.t_min, t_max, t);
+    return intersect_sphere<P>(ray.exact_origin, ray.exact_direction, {center, block.radius[lane]}, ray.t_min, t_max,
+                               t);
 }
 
 template <Precision P, class Count>

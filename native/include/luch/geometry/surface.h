@@ -59,7 +59,7 @@ LUCH_FN SurfacePoint triangle_point(Vec3 p0, Vec3 p1, Vec3 p2, float u, float v,
     return instance_point(object, object_error, extent, to_world, to_object);
 }
 
-// Where a ray enters a sphere of an instance, from the ray's own line: t would bring the digits of the distance.
+// Where a ray from outside enters a sphere of an instance, from the ray's own line: t would bring the digits of the distance.
 LUCH_FN SurfacePoint sphere_point(const Sphere& sphere, const Ray& ray, const Affine& to_world,
                                   const Affine& to_object) {
     Vec3 n = entered_at(sphere, transform_point(to_object, ray.origin), transform_direction(to_object, ray.direction));

@@ -76,7 +76,7 @@ struct SceneView {
     const float* positions;      // 3 per vertex, object space
     const u32* triangles;        // 3 per triangle, local vertex indices
     const u16* material_slots;   // per triangle; spheres show the first slot
-    const float* spheres;        // 4 per sphere: centre, radius, object space; only its outside is seen
+    const float* spheres;        // 4 per sphere: centre, radius (see Sphere), object space
     const float* normals;
     const float* attribute_data;
     const AttributeView* attributes;

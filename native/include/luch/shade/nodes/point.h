@@ -182,7 +182,7 @@ LUCH_POINT_OP(OpPointInfo, 5, 0, {
     const float* s = sphere_at(*c.scene, mesh, prim);
     store_vec3(out, transform_point(i->to_world, load_vec3(s)) + c.scene->origin);
     // A stretched one has many radii: this is the one towards (1, 1, 1), as Blender has it.
-    out[3] = length(transform_direction(i->to_world, make_vec3(s[3] * 0.57735027f)));
+    out[3] = length(transform_direction(i->to_world, make_vec3(abs_f(s[3]) * 0.57735027f)));
     out[4] = float(hash_words(prim - mesh.triangle_count, 0u)) * (1.0f / 4294967295.0f);
 });
 
