@@ -6,15 +6,21 @@ namespace luch::bindings {
 
 ArrayScene::ArrayScene(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags,
                        const IndexArray& mesh_rows, const IndexArray& instance_meshes, const FloatArray& to_world,
-                       const FloatArray& to_object, const IndexArray& visibility)
+                       const FloatArray& to_object, const IndexArray& visibility, const FloatArray& spheres)
     : meshes(size_t(mesh_rows.shape(0)), MeshView{}), instances(size_t(instance_meshes.shape(0)), InstanceView{}) {
     for (size_t m = 0; m < meshes.size(); ++m) {
-        const u32* row = mesh_rows.data() + 4 * m;
+        const u32* row = mesh_rows.data(py::ssize_t(m), 0);
         meshes[m].first_vertex = row[0];
         meshes[m].vertex_count = row[1];
         meshes[m].first_triangle = row[2];
         meshes[m].triangle_count = row[3];
-        if (flags.size()) mesh_flags.emplace_back(flags.data() + row[2], flags.data() + row[2] + row[3]);
+        if (mesh_rows.shape(1) == 6) {
+            meshes[m].first_sphere = row[4];
+            meshes[m].sphere_count = row[5];
+        }
+        if (flags.size() == 0) continue;
+        mesh_flags.emplace_back(flags.data() + row[2], flags.data() + row[2] + row[3]);
+        mesh_flags.back().resize(primitive_count(meshes[m]));
     }
     for (size_t i = 0; i < instances.size(); ++i) {
         instances[i].mesh = instance_meshes.data()[i];
@@ -24,6 +30,7 @@ ArrayScene::ArrayScene(const FloatArray& positions, const IndexArray& triangles,
     }
     view.positions = positions.data();
     view.triangles = triangles.data();
+    view.spheres = spheres.data();
     view.meshes = meshes.data();
     view.mesh_count = u32(meshes.size());
     view.instances = instances.data();

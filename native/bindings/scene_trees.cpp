@@ -13,9 +13,10 @@ class ArraySceneTrees {
     ArraySceneTrees(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags,
                     const IndexArray& meshes, const IndexArray& instance_meshes, const FloatArray& to_world,
                     const FloatArray& to_object, const IndexArray& visibility, int kind, u32 quality, u32 precision,
-                    unsigned threads, u64 flatten_triangles)
+                    unsigned threads, u64 flatten_triangles, const FloatArray& spheres)
         : pool_(threads) {
-        ArrayScene scene(positions, triangles, flags, meshes, instance_meshes, to_world, to_object, visibility);
+        ArrayScene scene(positions, triangles, flags, meshes, instance_meshes, to_world, to_object, visibility,
+                         spheres);
         py::gil_scoped_release release;
         trees_ = cpu::SceneTrees::build(scene.view, scene.mesh_flags, pool_, accel_choice(kind, quality, precision),
                                         flatten_triangles);
@@ -55,7 +56,8 @@ class ArraySceneTrees {
 void bind_scene_trees(py::module_& m) {
     py::class_<ArraySceneTrees>(m, "ArraySceneTrees")
         .def(py::init<const FloatArray&, const IndexArray&, const ByteArray&, const IndexArray&, const IndexArray&,
-                      const FloatArray&, const FloatArray&, const IndexArray&, int, u32, u32, unsigned, u64>())
+                      const FloatArray&, const FloatArray&, const IndexArray&, int, u32, u32, unsigned, u64,
+                      const FloatArray&>())
         .def("closest", &ArraySceneTrees::closest)
         .def("any", &ArraySceneTrees::any)
         .def("stats", &ArraySceneTrees::stats)

@@ -99,7 +99,7 @@ class Accel:
             here = np.eye(3, 4, dtype=np.float32).reshape(1, 12)
             self._wide = core.ArrayAccel(
                 points, corners, flags, mesh, np.zeros(1, np.uint32), here, here, np.full(1, 63, np.uint32),
-                -1, QUALITIES.index(quality), self._precision, threads, 0)  # fmt: skip
+                -1, QUALITIES.index(quality), self._precision, threads, 0, balls[:0])  # fmt: skip
             if len(balls):  # a tree of their own: the wide tree's blocks hold triangles
                 self._structure = core.ArrayStructure(
                     points, np.full_like(corners, 0xFFFFFFFF), balls, flags, STRUCTURES.index("BVH2"),

@@ -64,9 +64,10 @@ def mixed_rays(place: str, seed: int = 5) -> tuple[Any, Any]:
 
 
 def hidden(scene: Scene, seed: int = 8) -> Scene:
-    """The same, each instance unseen by some kinds of rays and a third of the triangles perhaps transparent."""
+    """The same, unseen by some kinds of rays, a third of the triangles perhaps transparent, spheres in its first mesh."""
     rng = np.random.default_rng(seed)
     scene.instances = [(m, matrix, int(rng.integers(64))) for m, matrix, _ in scene.instances]
+    scene.spheres[0] = np.concatenate([rng.uniform(-2, 2, (9, 3)), rng.uniform(0, 0.4, (9, 1))], 1)
     scene.flags = (rng.random(sum(len(t) for _, t in scene.meshes)) < 0.3).astype(np.uint8)
     return scene
 
@@ -95,7 +96,16 @@ def test_nothing_to_hit_and_no_rays_are_answered(place: str) -> None:
     check_equal(crowd(9), rays[:0], kinds[:0], "CWBVH", 0)
 
 
-def test_fibers_and_ptx_obey_the_rules_of_precision() -> None:
+def test_equal_hits_go_to_the_smaller_instance_on_the_device(place: str) -> None:
+    rng = np.random.default_rng(3)
+    points, triangles = icosphere(1)
+    twice = (points, np.concatenate([triangles, triangles[::-1]]))
+    scene = Scene([twice, twice], [(int(mesh), np.eye(3, 4), ALL) for mesh in rng.permutation([0, 1] * 6)])
+    rays, kinds = mixed_rays(place)
+    assert (check_equal(scene, rays, np.full(len(rays), ALL, np.uint32), "CWBVH", 0)[4] == 0).any()
+
+
+def test_ptx_of_scenes_obeys_the_rules_of_precision() -> None:
     assert set(table()["tracers"]) == {f"TRACE_{kind}" for kind in STRUCTURES}
     assert not faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f32")
     assert faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f64")

@@ -25,21 +25,27 @@ class Scene:
 
     meshes: list[Mesh]
     instances: list[tuple[int, NDArray[Any], int]] = field(default_factory=list)
+    spheres: dict[int, NDArray[Any]] = field(default_factory=dict)  # mesh -> (S, 4) centre, radius
     flags: NDArray[Any] = field(default_factory=lambda: np.zeros(0, np.uint8))  # PrimitiveFlag of every triangle
 
     def build(self, kind: str = "BVH", flatten: int = 0, precision: int = 1) -> Any:
         """The CPU's two levels."""
-        return core.ArrayAccel(*self._arrays(), _NUMBER[kind], 1, precision, 1, flatten)
+        return core.ArrayAccel(*self._arrays(), _NUMBER[kind], 1, precision, 1, flatten, self._spheres())
 
-    def trees(self, kind: str = "CWBVH", flatten: int = 0, precision: int = 1) -> Any:
+    def trees(self, kind: str = "CWBVH", flatten: int = 0, precision: int = 1, threads: int = 1) -> Any:
         """Those for devices."""
-        return core.ArraySceneTrees(*self._arrays(), _NUMBER[kind], 1, precision, 1, flatten)
+        return core.ArraySceneTrees(*self._arrays(), _NUMBER[kind], 1, precision, threads, flatten, self._spheres())
+
+    def _spheres(self) -> NDArray[Any]:
+        of_meshes = [self.spheres.get(m, np.zeros((0, 4))) for m in range(len(self.meshes))]
+        return np.concatenate(of_meshes).astype(np.float32)
 
     def _arrays(self) -> tuple[Any, ...]:
-        table, vertex, triangle = [], 0, 0
-        for points, triangles in self.meshes:
-            table.append([vertex, len(points), triangle, len(triangles)])
-            vertex, triangle = vertex + len(points), triangle + len(triangles)
+        table, vertex, triangle, ball = [], 0, 0, 0
+        for m, (points, triangles) in enumerate(self.meshes):
+            balls = len(self.spheres.get(m, ()))
+            table.append([vertex, len(points), triangle, len(triangles), ball, balls])
+            vertex, triangle, ball = vertex + len(points), triangle + len(triangles), ball + balls
         world = np.array([m for _, m, _ in self.instances], np.float32).reshape(-1, 12)
         inverse = [_inverse(m) for _, m, _ in self.instances]
         return (
