@@ -17,6 +17,12 @@ from .context import ExportContext
 
 MARKER = (1.0, 0.0, 1.0, 1.0)  # magenta: Blender's sign of a missing image
 SRGB = "sRGB"
+ALPHA_MODES = {
+    "STRAIGHT": "STRAIGHT",
+    "PREMUL": "PREMULTIPLIED",
+    "CHANNEL_PACKED": "CHANNEL_PACKED",
+    "NONE": "NONE",
+}
 LINEAR = frozenset({"Linear Rec.709", "Raw", "Non-Color"})
 
 
@@ -147,22 +153,37 @@ def _four_channels(pixels: NDArray[Any]) -> NDArray[Any]:
 def _bytes(image: Any, pixels: NDArray[np.uint8], context: ExportContext) -> Image:
     """8-bit pixels stay 8-bit where a shader can decode them: sRGB, linear, data."""
     settings = image.colorspace_settings
-    alpha = {"CHANNEL_PACKED": "CHANNEL_PACKED", "NONE": "NONE"}.get(image.alpha_mode, "STRAIGHT")
+    alpha = ALPHA_MODES[image.alpha_mode]
     if settings.name == SRGB:
         return Image(image.name, pixels, "SRGB", alpha)
-    if settings.is_data or settings.name in LINEAR:
+    opaque = alpha != "STRAIGHT" or bool((pixels[..., 3] == 255).all())
+    if settings.is_data or (settings.name in LINEAR and opaque):
         return Image(image.name, pixels, "LINEAR", alpha)
     linear = to_scene_linear(pixels, settings.name)
     if linear is None:
         context.warn(f'Image "{image.name}": colour space "{settings.name}" cannot be converted and is read as sRGB.')
         return Image(image.name, pixels, "SRGB", alpha)
-    return Image(image.name, linear, "LINEAR", alpha)
+    return _associated(Image(image.name, linear, "LINEAR", alpha))
+
+
+def _associated(image: Image) -> Image:
+    """Scene-linear floats with a straight alpha multiplied in, as shaders expect of colours."""
+    if image.alpha == "STRAIGHT":
+        image.pixels[..., :3] *= image.pixels[..., 3:]
+        image.alpha = "PREMULTIPLIED"
+    return image
 
 
 def _floats(image: Any, pixels: F32) -> Image:
-    """Blender's float buffers are scene-linear with the alpha multiplied in. Half floats where those are exact."""
-    alpha = {"CHANNEL_PACKED": "CHANNEL_PACKED", "NONE": "NONE"}.get(image.alpha_mode, "PREMULTIPLIED")
+    """Blender's float buffers are scene-linear; of files the alpha is multiplied in. Half floats where those are exact."""
+    result = Image(image.name, pixels, "LINEAR", ALPHA_MODES[image.alpha_mode])
+    if image.source == "GENERATED":
+        _associated(result)
+    elif result.alpha == "STRAIGHT":
+        result.alpha = "PREMULTIPLIED"
     with np.errstate(over="ignore", invalid="ignore"):
-        half = pixels.astype(np.float16)
-        exact = np.array_equal(half, pixels)
-    return Image(image.name, half if exact else pixels, "LINEAR", alpha)
+        half = result.pixels.astype(np.float16)
+        exact = np.array_equal(half, result.pixels)
+    if exact:
+        result.pixels = half
+    return result

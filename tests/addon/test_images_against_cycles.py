@@ -15,7 +15,9 @@ F32 = NDArray[np.float32]
 WIDTH, HEIGHT = 9, 6
 
 
-def picture(name: str, *, is_float: bool = False, data: bool = False, alpha_mode: str = "STRAIGHT") -> bpy.types.Image:
+def picture(
+    name: str, *, is_float: bool = False, data: bool = False, alpha_mode: str = "STRAIGHT", space: str = ""
+) -> bpy.types.Image:
     """A packed picture of random texels, alpha between 0 and 1."""
     if name in bpy.data.images:
         return bpy.data.images[name]
@@ -23,6 +25,8 @@ def picture(name: str, *, is_float: bool = False, data: bool = False, alpha_mode
     pixels = np.random.default_rng(7).uniform(0, 1, (HEIGHT, WIDTH, 4)).astype(np.float32)
     if is_float:
         pixels[..., :3] *= 3.0 * pixels[..., 3:]  # float buffers hold their colours with alpha multiplied in
+    if space:
+        image.colorspace_settings.name = space
     image.pixels.foreach_set(pixels.ravel())
     image.alpha_mode = alpha_mode
     image.update()
@@ -58,10 +62,16 @@ def image_cases() -> list[Case]:
         cases.append(Case(f"projection {projection}", kind, "Color", settings, {}, outliers=0.01))
     # Cycles merges equal nodes, and a node whose alpha is used gives other colours: so two interpolations.
     for output, interpolation in (("Color", "Linear"), ("Alpha", "Cubic")):
-        for mode in ("STRAIGHT", "CHANNEL_PACKED", "NONE"):
+        for mode in ("STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE"):
             settings = {"setup": shows(f"byte {mode}", alpha_mode=mode), "interpolation": interpolation}
             # Cycles multiplies alpha into bytes and rounds.
             cases.append(Case(f"bytes {mode} {output}", kind, output, settings, tolerance=6e-3, outliers=0.002))
+        for space in ("Linear Rec.709", "Linear Rec.2020"):
+            settings = {"setup": shows(space, space=space), "interpolation": interpolation}
+            cases.append(Case(f"bytes {space} {output}", kind, output, settings, tolerance=1e-2, outliers=0.002))
+        for mode in ("STRAIGHT", "PREMUL"):
+            settings = {"setup": shows(f"float {mode}", is_float=True, alpha_mode=mode), "interpolation": interpolation}
+            cases.append(Case(f"floats {mode} {output}", kind, output, settings, outliers=0.002))
         settings = {"setup": shows("data", data=True)}
         cases.append(Case(f"data {output}", kind, output, settings, tolerance=2e-3))
     cases.append(Case("no image", kind, "Color"))
