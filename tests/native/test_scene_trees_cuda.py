@@ -14,7 +14,7 @@ import pytest
 from luch.accel import STRUCTURES
 from luch.cuda.trace import SceneTracer
 from support import cuda_on_cpu
-from support.accel_meshes import random_rays, rows, soup
+from support.accel_meshes import icosphere, random_rays, rows, soup
 from support.instances import ALL, Scene, crowd
 
 from buildtools.kernels import faults, table
@@ -101,7 +101,7 @@ def test_equal_hits_go_to_the_smaller_instance_on_the_device(place: str) -> None
     points, triangles = icosphere(1)
     twice = (points, np.concatenate([triangles, triangles[::-1]]))
     scene = Scene([twice, twice], [(int(mesh), np.eye(3, 4), ALL) for mesh in rng.permutation([0, 1] * 6)])
-    rays, kinds = mixed_rays(place)
+    rays, _ = mixed_rays(place)
     assert (check_equal(scene, rays, np.full(len(rays), ALL, np.uint32), "CWBVH", 0)[4] == 0).any()
 
 
