@@ -21,7 +21,17 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         description="A setting that was changed for Cycles and never here keeps Cycles' value",
     )
     device: EnumProperty(
-        name="Device", items=[("CPU", "CPU", "Render on the processor")], default="CPU", description="What computes"
+        name="Device",
+        items=[
+            ("CPU", "CPU", "Render on the processor"),
+            (
+                "CUDA",
+                "CUDA",
+                "Render on an NVIDIA GPU (Turing or newer); without one the processor goes on and says so",
+            ),
+        ],
+        default="CPU",
+        description="What computes",
     )
     accelerator: EnumProperty(
         name="Structure",

@@ -20,7 +20,7 @@ AHEAD = NATIVE / "luch" / "kernels"
 DEFAULT = "WATERTIGHT"
 OLDEST = 75  # PTX for it runs on everything newer
 # Box distances are rounded once, on purpose (accel/wide_ray.h): in the compressed wide tree, which every scene's top is.
-FUSES_BOXES = re.compile("CWBVH|TRACE_.*")
+FUSES_BOXES = re.compile("CWBVH|TRACE_.*|RENDER_STAGES")
 # Where a walk is in doubt, its cells are found in double (accel/grid.h).
 WALKS_IN_DOUBLE = re.compile("(TRACE_)?(HIERARCHICAL_)?GRID")
 Unit = Tuple[str, str]  # module, precision
@@ -36,7 +36,7 @@ def units() -> List[Unit]:
     """Every module and tracer in every precision."""
     precisions = [name for name in table()["flags"] if name != "all"]
     return [(module, precision) for module in _traced() for precision in precisions] + [
-        (builder, DEFAULT) for builder in table()["builders"]
+        (name, DEFAULT) for name in [*table()["builders"], *table()["stages"]]
     ]
 
 
@@ -62,7 +62,7 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
         ptx = ptx_of(unit)
         flags = table()["flags"]["all"] + table()["flags"][precision]
         folders = ["-I", str(NATIVE / "include"), "-I", str(NATIVE / "cuda")]
-        source = NATIVE / "cuda" / {**_traced(), **table()["builders"]}[module]
+        source = NATIVE / "cuda" / {**_traced(), **table()["builders"], **table()["stages"]}[module]
         errors = _errors([found, "-ptx", f"-arch=compute_{OLDEST}", *flags, *folders, str(source), "-o", str(ptx)])
         known = table()["architectures"]
         chosen = known if everywhere or precision == DEFAULT else [known[0], known[-1]]

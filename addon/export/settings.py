@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from luch.scene import Settings
 
+from .. import command_line
 from ..settings import effective
 from .context import ExportContext
 
@@ -38,6 +40,7 @@ def export_settings(context: ExportContext) -> Settings:
         light_tree=effective(scene, "use_light_tree"),
         accelerator=scene.luch.accelerator,
         precision=scene.luch.precision,
+        device=scene.luch.device,
         estimate_error=scene.luch.estimate_error,
         **{name: effective(scene, name) for name in SAME_NAME},
     )
@@ -45,7 +48,7 @@ def export_settings(context: ExportContext) -> Settings:
         settings.samples = context.view_layer.samples
     if scene.world is not None:
         settings.ao_distance = scene.world.light_settings.distance
-    return settings
+    return replace(settings, **command_line.current())
 
 
 def _seed(scene: Any) -> int:

@@ -1,5 +1,9 @@
 // The renderer as Python sees it: one scene, rendered in steps, readable at any time between them.
+#include <algorithm>
+#include <cstddef>
+
 #include "bindings/bind.h"
+#include "bindings/device_image.h"
 #include "bindings/film.h"
 #include "bindings/scene_reader.h"
 
@@ -8,8 +12,9 @@ namespace {
 
 class PyRenderer {
  public:
-    explicit PyRenderer(const py::object& scene) {
+    PyRenderer(const py::object& scene, bool for_device) {
         ReadScene read = read_scene(scene);
+        read.input.for_device = for_device;
         dropped_instances_ = read.dropped_instances;
         renderer_ = std::make_unique<cpu::Renderer>(std::move(read.store), read.input);
     }
@@ -28,6 +33,54 @@ class PyRenderer {
     double step_progress() const { return renderer_->step_progress(); }
 
     py::dict passes() const { return resolve_film(renderer_->film()); }
+
+    // (blocks, links) as bindings/device_image.h has them: of the RenderTask and of the structure.
+    static py::tuple device_images(const py::object& self) {
+        cpu::Renderer& renderer = *self.cast<PyRenderer&>().renderer_;
+        cpu::DeviceImage trees;
+        renderer.trees().append(trees);
+        return py::make_tuple(bindings::device_image(renderer.device_image(), self),
+                              bindings::device_image(trees, self));
+    }
+
+    // The film's sums (pixels, channels) float64 and sample counts (pixels,) uint32, to be written by whoever renders
+    // in this renderer's place.
+    static py::tuple film_arrays(const py::object& self) {
+        cpu::Film& film = self.cast<PyRenderer&>().renderer_->film();
+        FilmView view = film.view();
+        py::ssize_t pixels = py::ssize_t(view.width) * py::ssize_t(view.height),
+                    stride = py::ssize_t(view.layout.stride);
+        py::array_t<double> rows({pixels, stride}, {stride * 8, py::ssize_t{8}}, view.rows, self);
+        py::array_t<u32> counts({pixels}, {py::ssize_t{4}}, view.sample_counts, self);
+        return py::make_tuple(rows, counts);
+    }
+
+    // What decides which code a device needs.
+    py::dict device_facts() const {
+        const RenderView& scene = renderer_->scene();
+        bool transparent = false;
+        u32 registers = 0;
+        py::list programs;
+        auto add = [&](const Program& p) {
+            transparent = transparent || (p.flags & PROGRAM_TRANSPARENT);
+            registers = std::max(registers, p.register_count);
+            programs.append(py::make_tuple(p.first_instruction, p.instruction_count, p.light_instruction_count,
+                                           p.register_count, p.first_constant, p.constant_count));
+        };
+        for (u32 m = 0; m < scene.view.material_count; ++m) add(scene.view.materials[m].program);
+        add(scene.view.world_program);
+        for (u32 l = 0; l < scene.view.lights->lamp_count; ++l)
+            if (scene.view.lights->lamps[l].has_program) add(scene.view.lights->lamps[l].program);
+        py::dict facts;
+        facts["programs"] = programs;
+        facts["registers"] = registers;
+        facts["transparent"] = transparent;
+        facts["materials"] = scene.view.material_count;
+        facts["structure"] = cpu::accel_name({false, renderer_->trees().kind()});
+        facts["one_group"] = renderer_->trees().is_one_group();
+        facts["find_light"] = scene.has_visible_lamps || scene.has_world;
+        return facts;
+    }
 
     py::tuple deviations() const { return film_deviations(renderer_->film()); }
 
@@ -66,12 +119,59 @@ class PyRenderer {
     u64 dropped_instances_ = 0;
 };
 
+// Where luch/cuda/render.py finds the fields that it sets in a RenderTask, by name; and the sizes of what it allocates.
+py::dict task_fields() {
+    py::dict fields;
+#define LUCH_FIELD(name) fields[#name] = offsetof(RenderTask, name)
+    LUCH_FIELD(film.rows);
+    LUCH_FIELD(film.sample_counts);
+    LUCH_FIELD(wave.slots);
+    LUCH_FIELD(wave.layer_pixels);
+    LUCH_FIELD(wave.layer_stride);
+    LUCH_FIELD(wave.film_pixels);
+    LUCH_FIELD(wave.paths);
+    LUCH_FIELD(wave.rays);
+    LUCH_FIELD(wave.ray_slot);
+    LUCH_FIELD(wave.ray_kind);
+    LUCH_FIELD(wave.next_rays);
+    LUCH_FIELD(wave.next_slot);
+    LUCH_FIELD(wave.next_kind);
+    LUCH_FIELD(wave.hits);
+    LUCH_FIELD(wave.sorted);
+    LUCH_FIELD(wave.material_first);
+    LUCH_FIELD(wave.shadow_rays);
+    LUCH_FIELD(wave.shadows);
+    LUCH_FIELD(wave.shadow_kind);
+    LUCH_FIELD(wave.blocked);
+    LUCH_FIELD(wave.aovs);
+    LUCH_FIELD(wave.counters);
+    LUCH_FIELD(wave.totals);
+    LUCH_FIELD(film.layout.stride);
+    LUCH_FIELD(film.layout.aov_count);
+    LUCH_FIELD(film.layout.ambient_occlusion);
+#undef LUCH_FIELD
+    return fields;
+}
+
+py::dict task_sizes() {
+    py::dict sizes;
+    sizes["path"] = PATH_WORDS * sizeof(PathWord);
+    sizes["ray"] = sizeof(Ray);
+    sizes["hit"] = sizeof(Hit);
+    sizes["shadow"] = sizeof(ShadowRay);
+    sizes["counters"] = u32(WAVE_COUNTERS);
+    sizes["totals"] = u32(TOTALS);
+    return sizes;
+}
+
 }  // namespace
 
 void bind_render(py::module_& m) {
     auto render = m.def_submodule("render", "Rendering of a luch.scene.Scene on the CPU.");
+    render.def("task_fields", &task_fields);
+    render.def("task_sizes", &task_sizes);
     py::class_<PyRenderer>(render, "Renderer")
-        .def(py::init<const py::object&>(), py::arg("scene"),
+        .def(py::init<const py::object&, bool>(), py::arg("scene"), py::arg("for_device") = false,
              "Reads the scene. Raises ValueError, naming the object, for data that does not fit together.")
         .def("prepare", &PyRenderer::prepare, "Builds structures and lights, once, first of all. False when cancelled.")
         .def("render", &PyRenderer::render, py::arg("first"), py::arg("count"),
@@ -81,6 +181,9 @@ void bind_render(py::module_& m) {
         .def("passes", &PyRenderer::passes, "Blender's pass name -> float32 (H, W, C), bottom row first.")
         .def("deviations", &PyRenderer::deviations,
              "(mean, deviation), float32 (H, W, 3): Combined, and one draw of its error. Asks for Film.halves.")
+        .def("device_images", [](const py::object& self) { return PyRenderer::device_images(self); })
+        .def("film_arrays", [](const py::object& self) { return PyRenderer::film_arrays(self); })
+        .def("device_facts", &PyRenderer::device_facts)
         .def("stats", &PyRenderer::stats, "Counts, bytes and seconds.");
 }
 

@@ -305,32 +305,11 @@ void Film::merge(const Film& other) {
     if (other.counts_.size() != counts_.size() || other.layout_.stride != layout_.stride ||
         other.passes_.size() != passes_.size())
         throw std::invalid_argument("Film: only films of the same size and passes merge.");
-    std::vector<bool> first_only(layout_.stride, false), crypto(layout_.stride, false);
-    for (const Pass& pass : passes_) {
-        bool first = pass.kind == PassKind::FIRST || pass.kind == PassKind::DEPTH;
-        for (u32 k = 0; first && k < pass.channels; ++k) first_only[pass.channel + k] = true;
-        for (u32 k = 0; pass.kind == PassKind::CRYPTO && k < 2 * layout_.crypto_slots; ++k)
-            crypto[pass.channel + k] = true;
-    }
     FilmWriter writer{view(), 0};
-    for (size_t pixel = 0; pixel < counts_.size(); ++pixel) {
-        FilmSum* to = rows_.get() + pixel * layout_.stride;
-        const FilmSum* from = other.rows_.get() + pixel * layout_.stride;
-        for (u32 c = 0; c < layout_.stride; ++c) {
-            if (first_only[c]) {
-                if (counts_[pixel] == 0) to[c] = from[c];
-            } else if (!crypto[c]) {
-                to[c] += from[c];
-            }
-        }
-        for (u32 channel : {layout_.crypto_object, layout_.crypto_material, layout_.crypto_asset}) {
-            if (channel == NONE) continue;
-            for (u32 i = 0; i < layout_.crypto_slots; ++i)
-                film_add_crypto(writer, static_cast<u32>(pixel), channel, static_cast<float>(from[channel + 2 * i]),
-                                static_cast<float>(from[channel + 2 * i + 1]));
-        }
-        counts_[pixel] += other.counts_[pixel];
-    }
+    FilmView from = view();
+    from.rows = other.rows_.get();
+    from.sample_counts = const_cast<u32*>(other.counts_.data());  // only read
+    for (size_t pixel = 0; pixel < counts_.size(); ++pixel) film_merge_pixel(writer, from, static_cast<u32>(pixel));
 }
 
 }  // namespace luch::cpu

@@ -80,4 +80,23 @@ void LightStore::build(const SceneView& scene, const std::vector<LampInput>& lam
     v.world = build_world(world, &a.world);
 }
 
+u32 LightStore::describe(DeviceImage& image) const {
+    const Arrays& a = *arrays_;
+    const LightsView& v = view_;
+    u32 block = image.add("lights", &v, sizeof(v));
+    image.add_array("lamps", block, v.lamps, a.lamps.size());
+    image.add_array("emitters", block, v.emitters, a.emitters.size());
+    image.add_array("light_nodes", block, v.nodes, a.nodes.size());
+    image.add_array("instance_lights", block, v.instances, a.emissive.instances.size());
+    image.add_array("triangle_emitters", block, v.triangle_emitters, a.emissive.triangle_emitters.size());
+    image.add_array("cluster_cdf", block, v.cluster_cdf, a.emissive.cluster_cdf.size());
+    image.add_array("lamp_boxes", block, v.boxes, a.boxes.size());
+    image.add_array("suns", block, v.suns, a.suns.size());
+    image.add_array("sun_irradiance", block, v.sun_irradiance, a.sun_irradiance.size());
+    image.add_array("world_density", block, v.world.density, a.world.density.size());
+    image.add_array("world_row_cdf", block, v.world.row_cdf, a.world.row_cdf.size());
+    image.add_array("world_column_cdf", block, v.world.column_cdf, a.world.column_cdf.size());
+    return block;
+}
+
 }  // namespace luch::cpu

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "cpu/device_image.h"
 #include "luch/light/light.h"
 
 namespace luch::cpu {
@@ -68,6 +69,8 @@ class LightStore {
                const std::vector<Color>& material_emission_estimate, bool use_light_tree, ThreadPool& pool,
                size_t most_triangles = MOST_TRIANGLES);
     const LightsView& view() const { return view_; }
+    // Adds view() and the arrays behind it; returns the view's block.
+    u32 describe(DeviceImage& image) const;
 
  private:
     struct Arrays;

@@ -287,6 +287,27 @@ std::vector<std::vector<u8>> SceneStore::transparency_flags() const {
     return flags;
 }
 
+void SceneStore::describe(DeviceImage& image, u32 block, const SceneView& view) const {
+    image.add_array("positions", block, view.positions, positions_.size());
+    image.add_array("triangles", block, view.triangles, triangles_.size());
+    image.add_array("spheres", block, view.spheres, spheres_.size());
+    image.add_array("material_slots", block, view.material_slots, material_slots_.size());
+    image.add_array("normals", block, view.normals, normals_.size());
+    image.add_array("attribute_data", block, view.attribute_data, attribute_data_.size());
+    image.add_array("attributes", block, view.attributes, attributes_.size());
+    image.add_array("meshes", block, view.meshes, meshes_.size());
+    image.add_array("instances", block, view.instances, instances_.size());
+    image.add_array("objects", block, view.objects, objects_.size());
+    image.add_array("material_table", block, view.material_table, material_table_.size());
+    image.add_array("materials", block, view.materials, materials_.size());
+    u32 images = image.add_array("images", block, view.images, images_.size());
+    for (size_t i = 0; i < images_.size(); ++i) {
+        u32 pixels = image.add("pixels", pixels_[i].data(), pixels_[i].size());
+        image.link(images, &images_[i].pixels, pixels);
+    }
+    programs_.describe(image, block, view);
+}
+
 size_t SceneStore::bytes() const {
     size_t sum =
         (positions_.size() + spheres_.size() + normals_.size() + attribute_data_.size() + triangles_.size()) * 4 +

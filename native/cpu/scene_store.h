@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "cpu/device_image.h"
 #include "cpu/shade/link.h"
 #include "luch/shade/scene_view.h"
 
@@ -80,6 +81,9 @@ class SceneStore {
     // Per mesh, per primitive: bit 0 set when some object that uses the mesh has a material there that may be
     // transparent for shadow rays. An empty inner vector: no primitive of that mesh.
     std::vector<std::vector<u8>> transparency_flags() const;
+
+    // Adds the arrays behind `view`, a copy of view() inside the image's block `block`.
+    void describe(DeviceImage& image, u32 block, const SceneView& view) const;
 
     size_t bytes() const;
     u32 attribute_id(const std::string& name);

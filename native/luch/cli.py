@@ -49,6 +49,9 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--samples", type=_positive(int), help="samples per pixel (default: the scene's)")
     render.add_argument("--time", type=_positive(float), metavar="S", help="stop after this many seconds")
     render.add_argument("--seed", type=int, help="seed of the sampler")
+    render.add_argument(
+        "--device", type=str.upper, choices=("CPU", "CUDA"), help="what computes (default: the scene's)"
+    )
     render.add_argument("--threads", type=int, help="0: one per processor")
     render.add_argument("--quiet", action="store_true", help="no progress on stderr")
     render.set_defaults(run=_render)
@@ -120,6 +123,8 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
         settings.time_limit = options.time
     if options.seed is not None:
         settings.seed = options.seed
+    if options.device is not None:
+        settings.device = options.device
     if options.threads is not None:
         settings.threads = options.threads
 

@@ -138,6 +138,21 @@ def _told_by(curve: accuracy.Curve) -> dict[str, Any]:
     return told
 
 
+def _renderer_for(scene: Scene) -> tuple[Any, list[str]]:
+    """The device's renderer; where CUDA is asked for and cannot be had, the CPU's and one sentence that says why."""
+    if scene.settings.device == "CPU":
+        return core.render.Renderer(scene), []
+    if scene.settings.device != "CUDA":
+        raise ValueError(f"Settings: device is {scene.settings.device!r}; it can be CPU or CUDA.")
+    from luch.cuda import DeviceError
+    from luch.cuda.render import DeviceRenderer
+
+    try:
+        return DeviceRenderer(scene), []
+    except DeviceError as error:
+        return core.render.Renderer(scene), [f"Rendered on the CPU: {error}"]
+
+
 def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) -> Result:
     """Renders ``scene`` as its settings say, until its samples or its time limit are reached.
 
@@ -149,7 +164,8 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     wants_error = ERROR_PASS in scene.film.passes
     settings = replace(scene.settings, estimate_error=scene.settings.estimate_error or wants_error)
     film = replace(scene.film, passes=[name for name in scene.film.passes if name != ERROR_PASS])
-    renderer = core.render.Renderer(replace(scene, film=film, settings=settings))
+    traced = replace(scene, film=film, settings=settings)
+    renderer, warnings = _renderer_for(traced)
     effects = effects_of(scene).as_dict()
     total = max(1, settings.samples)
     cancelled = not _watched(renderer.prepare, renderer, lambda: progress is None or progress(_preparing(total, start)))
@@ -224,12 +240,12 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         prepare_seconds=prepared - start,
         render_seconds=render_seconds,
         seed=settings.seed,
-        device="CPU",
+        device=getattr(renderer, "device", "CPU"),
         instruction_set=core.__name__.rsplit("_", 1)[-1],
         peak_memory_bytes=peak_memory_bytes(),
         cancelled=cancelled,
         stopped_by="cancel" if cancelled else "time" if timed_out else "samples",
-        warnings=list(scene.warnings),
+        warnings=[*scene.warnings, *warnings],
         effects=effects,
     )
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}

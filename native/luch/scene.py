@@ -224,6 +224,7 @@ class Settings:
     accelerator: str = "AUTO"  # or a kind of luch.accel
     precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
     integrator: str = "PATH"
+    device: str = "CPU"  # or "CUDA"
     estimate_error: bool = True  # two independent sequences a pixel, whose difference tells the picture's error
     ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
 

@@ -20,6 +20,8 @@
 #endif
 #define __forceinline__ inline
 #define __launch_bounds__(...)
+#define __noinline__
+#define __grid_constant__
 
 struct uint3_ {
     unsigned x, y, z;
@@ -30,6 +32,10 @@ struct float4 {
 struct uint4 {
     unsigned x, y, z, w;
 };
+
+#ifndef CUDA_ON_CPU_STACK
+#define CUDA_ON_CPU_STACK (1 << 16)  // bytes a thread
+#endif
 
 namespace cuda_on_cpu {
 
@@ -109,7 +115,7 @@ inline bool release_warp(int first) {
 inline void run_block(unsigned threads) {
     fibers.clear();
     fibers.resize(threads);
-    constexpr size_t STACK = 1 << 16;
+    constexpr size_t STACK = CUDA_ON_CPU_STACK;
     for (Fiber& f : fibers) {
         f.stack.reset(new char[STACK]);
         getcontext(&f.context);

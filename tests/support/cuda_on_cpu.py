@@ -7,11 +7,12 @@ need two blocks at once, and that NVRTC gives the same arithmetic.
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import re
 import subprocess
 import sys
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ import pytest
 from luch.cuda import compiler, device
 
 HERE = Path(__file__).parent
+# A kernel whose parameters stand in its source: paths.cu, shadow.cuh.
+PLAIN_KERNEL = r'extern "C" __global__ void\s+(?:__launch_bounds__\([^)]*\)\s*)?(\w+)\(([^)]*RenderTask[^)]*)\)\s*{'
 FLAGS = ["-std=gnu++20", "-O1", "-march=x86-64-v3", "-ffp-contract=off", "-shared", "-fPIC", "-w"]
 
 
@@ -59,7 +62,14 @@ class _Event:
         pass
 
 
-def compile_module(source: Path, precision: str, folder: Path, include: list[Path], shares_memory: bool = True) -> str:
+def compile_module(
+    source: Path,
+    precision: str,
+    folder: Path,
+    include: list[Path],
+    shares_memory: bool = True,
+    defines: Sequence[str] = (),
+) -> str:
     """The kernels of one .cu file as a library, its path: run_NAME(parameters, grid, block) for each.
 
     shares_memory: False gives every thread an array of its own where the source says __shared__.
@@ -68,7 +78,9 @@ def compile_module(source: Path, precision: str, folder: Path, include: list[Pat
     names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", text)))
     builds = re.findall(r"LUCH_BUILD_KERNEL\((\w+)\)\(const luch::BuildTask", text)
     traces = re.findall(r"LUCH_\w*TRACE_KERNEL\((\w+)\)\(LUCH_TRACE_ARGUMENTS\)", text)
-    assert names or builds or traces
+    stages = [(name, ["luch::RenderTask"]) for name in re.findall(r"LUCH_STAGE\((\w+)\) {", text)]
+    stages += [(name, _types(given)) for name, given in re.findall(PLAIN_KERNEL, text)]
+    assert names or builds or traces or stages
     runs = (
         "".join(
             f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
@@ -87,14 +99,28 @@ def compile_module(source: Path, precision: str, folder: Path, include: list[Pat
             "*(luch::TraceTask*)p[1]); });\n}\n"
             for name in traces
         )
+        + "".join(
+            f'extern "C" void run_{name}(void** p, unsigned grid, unsigned block) {{\n'
+            f"    cuda_on_cpu::launch(grid, block, [p] {{ ::{name}("
+            f"{', '.join(f'*({kind}*)p[{k}]' for k, kind in enumerate(kinds))}); }});\n}}\n"
+            for name, kinds in stages
+        )
     )
     file = folder / f"{source.stem}_{precision}.cpp"
     file.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n#include "{source}"\n{runs}')
     library = file.with_suffix(".so")
-    options = [f"-DLUCH_PRECISION={precision}", *(f"-I{path}" for path in include)]
+    options = [f"-DLUCH_PRECISION={precision}", *(f"-I{path}" for path in include), *defines]
     options += [] if shares_memory else ["-D__shared__="]
     subprocess.run(["c++", *FLAGS, *options, str(file), "-o", str(library)], check=True)
     return str(library)
+
+
+def _types(parameters: str) -> list[str]:
+    """Of a kernel's parameters, as they stand in its source."""
+    words = [
+        parameter.replace("__grid_constant__", "").replace("const ", "").split() for parameter in parameters.split(",")
+    ]
+    return [{"u32": "luch::u32"}.get(word[0], word[0]) for word in words]
 
 
 def _reached(source: Path, kernels: Path) -> str:
@@ -134,15 +160,16 @@ def fake_cupy() -> Any:
     properties = {"name": b"fibers", "multiProcessorCount": 2, "l2CacheSize": 0, "totalGlobalMem": 0}
     runtime = types.SimpleNamespace(
         free=lambda ptr: None, getDeviceCount=lambda: 1, getDeviceProperties=lambda i: properties, driverGetVersion=lambda: 0,
-        runtimeGetVersion=lambda: 0,
+        runtimeGetVersion=lambda: 0, memGetInfo=lambda: (1 << 26, 1 << 26),
     )  # fmt: skip
     cuda = types.SimpleNamespace(
-        Device=lambda: device, driver=driver, runtime=runtime, get_current_stream=lambda: types.SimpleNamespace(ptr=0),
+        Device=lambda: device, driver=driver, runtime=runtime, get_current_stream=lambda: types.SimpleNamespace(ptr=0, synchronize=lambda: None),
+        memory=types.SimpleNamespace(OutOfMemoryError=MemoryError),
         Event=_Event, get_elapsed_time=lambda a, b: 1.0,
     )  # fmt: skip
     return types.SimpleNamespace(
         __version__="fibers", cuda=cuda, asarray=_array, ascontiguousarray=_array,
-        asnumpy=np.array, empty=lambda *a: np.full(*a[:1], 77, *a[1:]).view(Array),
+        asnumpy=np.array, full=lambda *a: np.full(*a).view(Array), empty=lambda *a: np.full(*a[:1], 77, *a[1:]).view(Array),
         zeros=lambda *a: np.zeros(*a).view(Array), flatnonzero=lambda a: np.flatnonzero(a).view(Array), argsort=lambda a: np.argsort(a).view(Array),
     )  # fmt: skip
 
@@ -158,7 +185,20 @@ def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
             source, folders = compiler.source_of(module), list(compiler.source_folders())
             return compile_module(source, precision, folder, folders, shares_memory).encode()
 
+        def compiled_scene(
+            module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]
+        ) -> bytes:
+            own = folder / hashlib.sha256((programs + " ".join(defines)).encode()).hexdigest()[:8]
+            own.mkdir(exist_ok=True)
+            (own / compiler.SCENE_PROGRAMS).write_text(programs)
+            source, folders = compiler.source_of(module), [*compiler.source_folders(), own]
+            return compile_module(
+                source, precision, own, folders, shares_memory, [*defines, "-DCUDA_ON_CPU_STACK=(1<<18)"]
+            ).encode()
+
         patch.setattr(compiler, "compiled", compiled)
+        patch.setattr(compiler, "kept_scene", lambda *given: None)
+        patch.setattr(compiler, "compiled_scene", compiled_scene)
         forget()
         yield
     forget()

@@ -50,14 +50,12 @@ bool Renderer::prepare() {
 void Renderer::build_all() {
     scene_.view = store_->finish();
     double start = seconds_now();
-    ChosenAccel chosen = build_chosen(scene_.view, store_->transparency_flags(), pool_, input_.accel);
-    accel_ = std::move(chosen.accel);
-    stats_.accel_name = accel_name(chosen.choice);
-    stats_.accel_reason = chosen.reason;
+    if (input_.for_device)
+        build_device_trees();
+    else
+        build_accel();
     stats_.accel_seconds = seconds_now() - start;
-    stats_.accel = accel_->stats();
     stats_.scene_bytes = store_->bytes();
-    scene_.accel = accel_.get();
     scene_.camera = input_.camera;
     scene_.view.camera = &scene_.camera;
     scene_.view.frame_size = {float(input_.frame_width), float(input_.frame_height)};
@@ -77,12 +75,43 @@ void Renderer::build_all() {
     start = seconds_now();
     build_lights();
     stats_.lights_seconds = seconds_now() - start;
-    for (unsigned worker = 0; worker < pool_.size(); worker++) {
+    for (unsigned worker = 0; worker < pool_.size() && !input_.for_device; worker++) {
         batches_.push_back(std::make_unique<Batch>(scene_, film_.view()));
     }
 }
 
 Renderer::~Renderer() = default;
+
+void Renderer::build_accel() {
+    ChosenAccel chosen = build_chosen(scene_.view, store_->transparency_flags(), pool_, input_.accel);
+    accel_ = std::move(chosen.accel);
+    stats_.accel_name = accel_name(chosen.choice);
+    stats_.accel_reason = chosen.reason;
+    stats_.accel = accel_->stats();
+    scene_.accel = accel_.get();
+}
+
+void Renderer::build_device_trees() {
+    trees_ = SceneTrees::build(scene_.view, store_->transparency_flags(), pool_, input_.accel.choice);
+    stats_.accel_name = input_.accel.choice.wide ? "CWBVH" : accel_name(input_.accel.choice);
+    stats_.accel_reason = input_.accel.automatic ? "on CUDA the compressed wide tree is the fastest in all measured "
+                                                   "scenes (docs/rays.md)"
+                                                 : "chosen in the scene's settings";
+    stats_.accel = trees_->stats();
+}
+
+DeviceImage Renderer::device_image() {
+    DeviceImage image;
+    task_.scene = scene_;
+    task_.film = film_.view();
+    u32 block = image.add("task", &task_, sizeof(task_));
+    store_->describe(image, block, task_.scene.view);
+    image.link(block, &task_.scene.view.lights, lights_.describe(image));
+    image.add_array("camera", block, task_.scene.view.camera, 1);
+    image.add_array("filter", block, task_.scene.filter, 1);
+    image.add_array("material_emission", block, task_.scene.material_emission, scene_.emission_of_materials.size());
+    return image;
+}
 
 // What does not change from point to point is evaluated here, once.
 void Renderer::find_constants() {

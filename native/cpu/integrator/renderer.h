@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "cpu/accel/choice.h"
+#include "cpu/accel/scene_trees.h"
+#include "cpu/device_image.h"
 #include "cpu/film.h"
 #include "cpu/integrator/batch.h"
 #include "cpu/integrator/render_scene.h"
@@ -13,6 +15,7 @@
 #include "cpu/scene_store.h"
 #include "cpu/sky/world_sun.h"
 #include "cpu/thread_pool.h"
+#include "luch/integrator/wavefront.h"
 
 namespace luch::cpu {
 
@@ -24,6 +27,7 @@ struct RenderInput {
     std::vector<Color> material_emission_estimate;
     bool light_tree = true;
     AccelRequest accel;
+    bool for_device = false;  // another device traces: no structures of this processor, no batches
     CameraView camera{};
     u32 frame_width = 0, frame_height = 0;  // pixels of the full frame
     PixelFilter filter{};
@@ -65,9 +69,17 @@ class Renderer {
     double step_progress() const;
     RenderStats stats() const;
     const Film& film() const { return film_; }
+    Film& film() { return film_; }
+    const RenderView& scene() const { return scene_; }
+    // For another device, after prepare(): the RenderTask (block 0) and the scene's arrays behind it. The film's sums
+    // and the wavefront are left to the device. The image borrows from the renderer.
+    DeviceImage device_image();
+    const SceneTrees& trees() const { return *trees_; }
 
  private:
     void build_all();
+    void build_accel();
+    void build_device_trees();
     void find_constants();
     void build_lights();
     WorldSun find_sun(WorldInput& world);  // and tells the world of it
@@ -77,9 +89,11 @@ class Renderer {
     std::unique_ptr<SceneStore> store_;
     ThreadPool pool_;
     std::unique_ptr<Accel> accel_;
+    std::unique_ptr<SceneTrees> trees_;  // instead of accel_, for another device
     LightStore lights_;
     RenderScene scene_;
     Film film_;
+    RenderTask task_{};
     std::vector<std::unique_ptr<Batch>> batches_;
     std::atomic<bool> cancelled_{false};
     std::atomic<u64> tiles_done_{0};

@@ -71,4 +71,14 @@ void LinkedPrograms::fill(SceneView& view) const {
     view.program_aovs = aovs.data();
 }
 
+void LinkedPrograms::describe(DeviceImage& image, u32 block, const SceneView& view) const {
+    image.add_array("instructions", block, view.instructions, instructions.size());
+    image.add_array("operands", block, view.operands, operands.size());
+    image.add_array("constants", block, view.constants, constants.size());
+    image.add_array("tables", block, view.tables, tables.size());
+    image.add_array("program_images", block, view.program_images, images.size());
+    image.add_array("program_attributes", block, view.program_attributes, attributes.size());
+    image.add_array("program_aovs", block, view.program_aovs, aovs.size());
+}
+
 }  // namespace luch::cpu

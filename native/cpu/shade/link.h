@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "cpu/device_image.h"
 #include "cpu/shade/interpreter.h"
 
 namespace luch::cpu {
@@ -27,6 +28,8 @@ struct LinkedPrograms {
     // Checks the program, appends it, and returns where it lies. Throws std::invalid_argument.
     Program add(const ProgramSource& source);
     void fill(SceneView& view) const;
+    // The same arrays for a device: `view` lies inside the image's block `block`.
+    void describe(DeviceImage& image, u32 block, const SceneView& view) const;
 };
 
 }  // namespace luch::cpu

@@ -14,13 +14,15 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from luch.cuda.device import DeviceError, Module, architecture_of, cupy
 
 PACKAGE = Path(__file__).resolve().parents[1]
 AHEAD = PACKAGE / "kernels"  # NAME.cubin, compiled by build.py
+SCENE_PROGRAMS = "luch_scene_programs.cuh"  # the header that a scene's own kernels include
 
 
 def source_folders() -> tuple[Path, Path]:
@@ -50,8 +52,9 @@ def _sources_hash() -> str:
 
 
 def source_of(module: str) -> Path:
-    """The .cu file of a module, tracer or builder of kernels.json."""
-    name: str = (table()["modules"] | table()["tracers"] | table()["builders"])[module]
+    """The .cu file of a module, tracer, builder or stage of kernels.json."""
+    known = table()["modules"] | table()["tracers"] | table()["builders"] | table()["stages"]
+    name: str = known[module]
     return source_folders()[1] / name
 
 
@@ -72,34 +75,76 @@ def ahead_name(module: str, precision: str, architecture: int) -> str:
 def load(module: str, precision: str) -> Module:
     """The module of kernels.json for the current device. Raises DeviceError if it does not compile."""
     architecture = architecture_of(cupy())
+    return Module(ahead(module, precision, architecture) or compiled(module, precision, architecture))
+
+
+def ahead(module: str, precision: str, architecture: int) -> bytes | None:
+    """What build.py compiled ahead of time."""
     ready = AHEAD / ahead_name(module, precision, architecture)
-    if ready.is_file():
-        return Module(ready.read_bytes())
-    return Module(compiled(module, precision, architecture))
+    return ready.read_bytes() if ready.is_file() else None
 
 
 def compiled(module: str, precision: str, architecture: int) -> bytes:
     """Machine code (PTX where NVRTC is older than the device) out of the cache, or compiled now and kept there."""
     from cupy.cuda import nvrtc  # needs no device
 
+    unit = _Unit(module, precision, architecture, "", ())
+    return _kept(_cache_name(nvrtc, unit)) or _compile_and_keep(nvrtc, unit)
+
+
+def kept_scene(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes | None:
+    """A scene's own kernels, if they were compiled before. programs: luch.cuda.programs.source."""
+    from cupy.cuda import nvrtc
+
+    return _kept(_cache_name(nvrtc, _Unit(module, precision, architecture, programs, tuple(defines))))
+
+
+def compiled_scene(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes:
+    """The same, compiled now and kept."""
+    from cupy.cuda import nvrtc
+
+    return _compile_and_keep(nvrtc, _Unit(module, precision, architecture, programs, tuple(defines)))
+
+
+class _Unit(NamedTuple):
+    module: str
+    precision: str
+    architecture: int
+    programs: str  # text of luch_scene_programs.cuh; "": none
+    defines: tuple[str, ...]
+
+
+def _cache_name(nvrtc: Any, unit: _Unit) -> str:
     version = ".".join(str(part) for part in nvrtc.getVersion())
-    name = f"{Path(ahead_name(module, precision, architecture)).stem}-nvrtc-{version}.bin"
+    stem = Path(ahead_name(unit.module, unit.precision, unit.architecture)).stem
+    if unit.programs or unit.defines:
+        text = chr(0).join((unit.programs, *unit.defines))
+        stem += "-scene-" + hashlib.sha256(text.encode()).hexdigest()[:16]
+    return f"{stem}-nvrtc-{version}.bin"
+
+
+def _kept(name: str) -> bytes | None:
     folder = cache_folder()
-    if folder is not None and (folder / name).is_file():
-        return (folder / name).read_bytes()
-    image = _compile(nvrtc, module, precision, architecture)
+    return (folder / name).read_bytes() if folder is not None and (folder / name).is_file() else None
+
+
+def _compile_and_keep(nvrtc: Any, unit: _Unit) -> bytes:
+    image = _compile(nvrtc, unit)
+    folder = cache_folder()
     if folder is not None:
-        _keep(folder, name, image)
+        _keep(folder, _cache_name(nvrtc, unit), image)
     return image
 
 
-def _compile(nvrtc: Any, module: str, precision: str, architecture: int) -> bytes:
+def _compile(nvrtc: Any, unit: _Unit) -> bytes:
+    module, architecture = unit.module, unit.architecture
     include, kernels = source_folders()
     known = [a for a in nvrtc.getSupportedArchs() if a <= architecture]
     target = f"sm_{architecture}" if architecture in known else f"compute_{max(known)}"  # the driver compiles PTX on
-    options = [f"-arch={target}", f"-I{include}", f"-I{kernels}", *flags(precision)]
+    options = [f"-arch={target}", f"-I{include}", f"-I{kernels}", *flags(unit.precision), *unit.defines]
     source = source_of(module)
-    program = nvrtc.createProgram(source.read_text(encoding="utf-8"), str(source), (), ())
+    headers = ((unit.programs,), (SCENE_PROGRAMS,)) if unit.programs else ((), ())
+    program = nvrtc.createProgram(source.read_text(encoding="utf-8"), str(source), *headers)
     try:
         nvrtc.compileProgram(program, tuple(options))
         image: bytes = nvrtc.getCUBIN(program) if target.startswith("sm_") else nvrtc.getPTX(program)

@@ -26,6 +26,11 @@ class SceneTracer:
         self._closest, self._any = module.kernel(f"trace_closest{one}"), module.kernel(f"trace_any{one}")
 
     @property
+    def root(self) -> Any:
+        """The view's bytes (TwoLevelView), a kernel's parameter."""
+        return self._trees.root
+
+    @property
     def bytes(self) -> int:
         """On the device."""
         return self._trees.bytes

@@ -143,4 +143,41 @@ LUCH_FN void film_count_samples(FilmWriter& writer, u32 pixel, u32 samples, u32 
     if (writer.film.layout.half != NONE) film_row(writer.film, pixel)[writer.film.layout.half + 3u] += others;
 }
 
+// What the first sample alone says, not a sum.
+LUCH_FN bool film_is_first(const FilmLayout& layout, u32 channel) {
+    return channel == layout.depth || channel == layout.object_index || channel == layout.material_index ||
+           (layout.position != NONE && channel - layout.position < 3u);
+}
+
+// Pairs of id and weight.
+LUCH_FN bool film_is_crypto(const FilmLayout& layout, u32 channel) {
+    u32 width = 2u * layout.crypto_slots;
+    return (layout.crypto_object != NONE && channel - layout.crypto_object < width) ||
+           (layout.crypto_material != NONE && channel - layout.crypto_material < width) ||
+           (layout.crypto_asset != NONE && channel - layout.crypto_asset < width);
+}
+
+// Adds what another film of the same layout holds of a pixel, e.g. other samples. What the first sample sees is kept
+// where the pixel has samples.
+LUCH_FN void film_merge_pixel(FilmWriter& writer, const FilmView& other, u32 pixel) {
+    const FilmLayout& layout = writer.film.layout;
+    FilmSum* to = film_row(writer.film, pixel);
+    const FilmSum* from = film_row(other, pixel);
+    bool empty = writer.film.sample_counts[pixel] == 0;
+    for (u32 c = 0; c < layout.stride; ++c) {
+        if (film_is_first(layout, c)) {
+            if (empty) to[c] = from[c];
+        } else if (!film_is_crypto(layout, c)) {
+            to[c] += from[c];
+        }
+    }
+    for (u32 kind = 0; kind < 3u && layout.crypto_slots > 0u; ++kind) {
+        u32 channel = kind == 0u ? layout.crypto_object : kind == 1u ? layout.crypto_material : layout.crypto_asset;
+        if (channel == NONE) continue;
+        for (u32 c = channel; c < channel + 2u * layout.crypto_slots; c += 2u)
+            film_add_crypto(writer, pixel, channel, static_cast<float>(from[c]), static_cast<float>(from[c + 1u]));
+    }
+    writer.film.sample_counts[pixel] += other.sample_counts[pixel];
+}
+
 }  // namespace luch

@@ -1,0 +1,43 @@
+"""What a farm says behind `--` on Blender's command line: `blender -b x.blend -E LUCH -f 1 -- --luch-device CUDA`.
+
+It overrules the file for this process alone. Blender hands words behind `--` to scripts and add-ons; those of others
+are left alone, a misspelt one of ours is told by name.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import sys
+
+
+class CommandLineError(ValueError):
+    """A `--luch-...` option that does not exist or has no such value."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> None:  # type: ignore[override]
+        raise CommandLineError(f"Command line: {message}. Luch knows {', '.join(OPTIONS)}.")
+
+
+OPTIONS = ("--luch-device CPU|CUDA",)
+
+
+@functools.cache
+def overrides(words: tuple[str, ...]) -> dict[str, str]:
+    """Names of luch.scene.Settings -> values. words: sys.argv. Raises CommandLineError."""
+    if "--" not in words:
+        return {}
+    own = list(words[words.index("--") + 1 :])
+    parser = _Parser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--luch-device", choices=("CPU", "CUDA"), type=str.upper)
+    found, rest = parser.parse_known_args(own)
+    unknown = [word for word in rest if word.startswith("--luch")]
+    if unknown:
+        raise CommandLineError(f"Command line: {unknown[0]} is unknown. Luch knows {', '.join(OPTIONS)}.")
+    return {name.removeprefix("luch_"): value for name, value in vars(found).items() if value is not None}
+
+
+def current() -> dict[str, str]:
+    """Of this process."""
+    return overrides(tuple(sys.argv))

@@ -1,0 +1,33 @@
+// Stages at which a path meets light without a surface: lamps on its way, and what lies behind the scene.
+#pragma once
+#include "luch/integrator/found_light.h"
+#include "render/stage.cuh"
+
+LUCH_STAGE(find_light) {
+    using namespace luch;
+    const Wavefront& wave = task.wave;
+    u32 k = stage_index();
+    if (k >= wave.counters[WAVE_RAYS]) return;
+    bool missed = wave.hits[k].instance == NONE;
+    if (!missed && !task.scene.has_visible_lamps) return;
+    u32 slot = wave.ray_slot[k];
+    PathState path = load_path(wave, slot);
+    Ray ray = wave.rays[k];
+    FilmWriter writer = film_of_slot(task, slot);
+    ShadePoints points;
+    ClosureSet set;
+    PointShader shader{task.scene.view, set};
+    if (task.scene.has_visible_lamps) find_lamps(task.scene, writer, path, ray, wave.hits[k].t, shader, points);
+    if (missed && leave_scene(task.scene, writer, path, ray, shader, points)) {
+        Color radiance = task.scene.world_emission.radiance;
+        if (!task.scene.world_emission.constant) {
+            points.count = 1;
+            setup_world_lane(path, ray.direction, points, 0);
+            run_program(context_of(task.scene.view, task.scene.view.world_program, points, set, nullptr));
+            radiance = set.emission;
+            add_total(wave, TOTAL_WORLD_POINTS, 1);
+        }
+        add_world(task.scene, writer, path, ray.direction, radiance);
+    }
+    add_total(wave, TOTAL_REJECTED, writer.rejected);
+}

@@ -1,0 +1,123 @@
+// The stages that run no shader program: beginning paths, sorting hits by material, passing on to the next round.
+#include "luch/integrator/camera_path.h"
+#include "luch/integrator/wavefront.h"
+
+namespace luch {
+inline constexpr int STAGE_BLOCK = 128;    // threads; luch/cuda/render.py launches as many
+inline constexpr u32 COUNTED_IN_BLOCK = 1024;  // materials whose counts a block keeps in shared memory
+
+__device__ __forceinline__ u32 stage_index() { return blockIdx.x * blockDim.x + threadIdx.x; }
+
+__device__ __forceinline__ u32 material_of(const RenderTask& task, u32 k) {
+    const Hit& hit = task.wave.hits[k];
+    return hit.instance == NONE ? NONE : material_at(task.scene.view, hit.instance, hit.prim);
+}
+}  // namespace luch
+
+using luch::u32;
+
+extern "C" __global__ void begin_paths(const __grid_constant__ luch::RenderTask task, const luch::WaveRange range) {
+    using namespace luch;
+    u32 i = stage_index(), count = range.pixel_count * range.sample_count;
+    if (i == 0) task.wave.counters[WAVE_RAYS] = count;
+    if (i >= count) return;
+    u32 layer = i / range.pixel_count, within = i % range.pixel_count, pixel = range.first_pixel + within;
+    u32 slot = layer * task.wave.layer_pixels + within, sample = range.first_sample + layer;
+    u32 px = task.film.x0 + pixel % task.film.width, py = task.film.y0 + pixel / task.film.width;
+    FilmWriter writer = film_of_slot(task, slot);
+    film_count_samples(writer, pixel, 1u, other_half_samples(task.scene, sample, 1u));
+    Sampler sampler =
+        make_sampler(make_pixel_sequences(px, py, task.scene.seed, task.scene.log2_samples, task.scene.halves), sample);
+    Vec2 lens_u = has_lens(task.scene) ? sample_2d(sampler, 1) : Vec2{0.5f, 0.5f};
+    PathState path;
+    task.wave.rays[i] = begin_path(task.scene, task.film, px, py, sample, sampler, sample_2d(sampler, 0), lens_u, path);
+    task.wave.ray_slot[i] = slot;
+    task.wave.ray_kind[i] = path.visibility;
+    store_path(task.wave, slot, path);
+}
+
+// How many hits each material has.
+extern "C" __global__ void count_materials(const __grid_constant__ luch::RenderTask task) {
+    using namespace luch;
+    __shared__ u32 counts[COUNTED_IN_BLOCK];
+    const Wavefront& wave = task.wave;
+    u32 materials = task.scene.view.material_count, k = stage_index();
+    bool in_block = materials <= COUNTED_IN_BLOCK;
+    for (u32 m = threadIdx.x; in_block && m < materials; m += blockDim.x) counts[m] = 0;
+    __syncthreads();
+    u32 m = k < wave.counters[WAVE_RAYS] ? material_of(task, k) : NONE;
+    if (m != NONE) atomicAdd(in_block ? counts + m : wave.material_first + m, 1u);
+    __syncthreads();
+    for (u32 i = threadIdx.x; in_block && i < materials; i += blockDim.x)
+        if (counts[i] != 0) atomicAdd(wave.material_first + i, counts[i]);
+}
+
+// Counts become beginnings. One block.
+extern "C" __global__ void place_materials(const __grid_constant__ luch::RenderTask task) {
+    using namespace luch;
+    __shared__ u32 sums[STAGE_BLOCK];
+    const Wavefront& wave = task.wave;
+    u32 materials = task.scene.view.material_count, before = 0;
+    for (u32 first = 0; first < materials; first += STAGE_BLOCK) {
+        u32 m = first + threadIdx.x, own = m < materials ? wave.material_first[m] : 0u;
+        sums[threadIdx.x] = own;
+        __syncthreads();
+        for (u32 step = 1; step < STAGE_BLOCK; step *= 2) {
+            u32 left = threadIdx.x >= step ? sums[threadIdx.x - step] : 0u;
+            __syncthreads();
+            sums[threadIdx.x] += left;
+            __syncthreads();
+        }
+        if (m < materials) wave.material_first[m] = before + sums[threadIdx.x] - own;
+        before += sums[STAGE_BLOCK - 1];
+        __syncthreads();
+    }
+    if (threadIdx.x == 0) wave.counters[WAVE_HITS] = before;
+}
+
+// Each hit goes to its material's group; the order within a group is a matter of chance.
+extern "C" __global__ void sort_hits(const __grid_constant__ luch::RenderTask task) {
+    using namespace luch;
+    __shared__ u32 counts[COUNTED_IN_BLOCK], places[COUNTED_IN_BLOCK];
+    const Wavefront& wave = task.wave;
+    u32 materials = task.scene.view.material_count, k = stage_index();
+    bool in_block = materials <= COUNTED_IN_BLOCK;
+    for (u32 m = threadIdx.x; in_block && m < materials; m += blockDim.x) counts[m] = 0;
+    __syncthreads();
+    u32 m = k < wave.counters[WAVE_RAYS] ? material_of(task, k) : NONE;
+    u32 place = 0;
+    if (m != NONE) place = atomicAdd(in_block ? counts + m : wave.material_first + m, 1u);
+    __syncthreads();
+    for (u32 i = threadIdx.x; in_block && i < materials; i += blockDim.x)
+        if (counts[i] != 0) places[i] = atomicAdd(wave.material_first + i, counts[i]);
+    __syncthreads();
+    if (m != NONE) wave.sorted[(in_block ? places[m] : 0u) + place] = k;
+}
+
+// The next round's rays become this one's; the host swaps their arrays.
+extern "C" __global__ void next_round(const __grid_constant__ luch::RenderTask task) {
+    using namespace luch;
+    const Wavefront& wave = task.wave;
+    for (u32 m = threadIdx.x; m < task.scene.view.material_count; m += blockDim.x) wave.material_first[m] = 0;
+    if (threadIdx.x != 0) return;
+    wave.counters[WAVE_RAYS] = wave.counters[WAVE_NEXT_RAYS];
+    for (u32 c = WAVE_NEXT_RAYS; c < WAVE_COUNTERS; ++c) wave.counters[c] = 0;
+}
+
+// Adds the layers [1, layers) to layer 0 and empties them: one thread a pixel.
+extern "C" __global__ void merge_layers(const __grid_constant__ luch::RenderTask task, const u32 layers) {
+    using namespace luch;
+    u32 pixel = stage_index();
+    if (pixel >= task.wave.film_pixels) return;
+    FilmWriter to{task.film, 0};
+    for (u32 layer = 1; layer < layers; ++layer) {
+        FilmView from = task.film;
+        from.rows += u64(layer) * task.wave.layer_stride;
+        from.sample_counts += u64(layer) * task.wave.film_pixels;
+        if (from.sample_counts[pixel] == 0) continue;
+        film_merge_pixel(to, from, pixel);
+        from.sample_counts[pixel] = 0;
+        FilmSum* row = film_row(from, pixel);
+        for (u32 c = 0; c < task.film.layout.stride; ++c) row[c] = 0;
+    }
+}

@@ -1,0 +1,41 @@
+// What the stages of the wavefront share: who a thread is, appending to queues, a program at one point.
+#pragma once
+#include "luch/integrator/wavefront.h"
+#include "render/programs.cuh"
+
+namespace luch {
+
+inline constexpr int STAGE_BLOCK = 128;  // threads; luch/cuda/render.py launches as many
+
+__device__ __forceinline__ u32 stage_index() { return blockIdx.x * blockDim.x + threadIdx.x; }
+
+// A place at the end of a queue; which one is a matter of chance, and nothing depends on it.
+__device__ __forceinline__ u32 append(const Wavefront& wave, WaveCounter queue) {
+    return atomicAdd(wave.counters + queue, 1u);
+}
+
+__device__ __forceinline__ void add_total(const Wavefront& wave, WaveTotal total, u64 amount) {
+    if (amount != 0) atomicAdd(wave.totals + total, amount);
+}
+
+__device__ __forceinline__ OpContext context_of(const SceneView& scene, const Program& program,
+                                                const ShadePoints& points, ClosureSet& set, float* aovs) {
+    clear_closures(set);
+    return {&scene, &program, &points, 0, &set, aovs};
+}
+
+// What luch/integrator's functions ask for: the light of a program at a point.
+struct PointShader {
+    const SceneView& scene;
+    ClosureSet& set;
+
+    __device__ __forceinline__ const ClosureSet& light(const Program& program, const ShadePoints& points) {
+        run_light_program(context_of(scene, program, points, set, nullptr));
+        return set;
+    }
+};
+
+}  // namespace luch
+
+#define LUCH_STAGE(name) \
+    extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK) name(const __grid_constant__ luch::RenderTask task)

@@ -1,0 +1,10 @@
+// The stages that run shader programs, in one module: what they call stands in it once.
+#ifndef LUCH_TRANSPARENT
+#define LUCH_TRANSPARENT 1  // some material lets light through
+#endif
+#ifndef LUCH_STRUCTURE
+#define LUCH_STRUCTURE Cwbvh
+#endif
+#include "render/light.cuh"
+#include "render/shadow.cuh"
+#include "render/surface.cuh"

@@ -1,0 +1,102 @@
+// The paths of a device under way at once, as structures of arrays, and the queues between its stages. Plain data:
+// filled by the host (bindings/render.cpp makes it, luch/cuda/render.py sets the device's pointers), read by kernels.
+#pragma once
+#include "luch/integrator/direct_light.h"
+
+namespace luch {
+
+// Counters between stages, reset by the device itself.
+enum WaveCounter : u32 {
+    WAVE_RAYS,         // under way in this round
+    WAVE_NEXT_RAYS,    // of the next round
+    WAVE_SHADOWS,
+    WAVE_HITS,         // rays that met a surface
+    WAVE_TRACED,       // work counter of the closest kernel
+    WAVE_SHADOWED,     // and of the shadow kernel
+    WAVE_COUNTERS
+};
+
+// Statistics, sums over the whole render.
+enum WaveTotal : u32 {
+    TOTAL_SURFACE_POINTS,
+    TOTAL_REJECTED,
+    TOTAL_TRANSPARENT_STEPS,
+    TOTAL_TRANSPARENT_RAYS,
+    TOTAL_WORLD_POINTS,
+    TOTAL_LIGHT_POINTS,
+    TOTALS
+};
+
+// 16 bytes of every path stand together, so that neighbouring threads read neighbouring memory.
+struct alignas(16) PathWord {
+    u32 w[4];
+};
+inline constexpr u32 PATH_WORDS = (sizeof(PathState) + sizeof(PathWord) - 1) / sizeof(PathWord);
+
+// A slot holds one path. Slot = layer * layer_pixels + pixel within the wave: paths of one pixel that are under way
+// together write to different layers of the film, so that no sum depends on who came first.
+struct Wavefront {
+    u32 slots, layer_pixels;
+    u64 layer_stride;          // FilmSums from layer to layer
+    u32 film_pixels;           // sample counts from layer to layer
+    PathWord* paths;           // [word * slots + slot]
+    Ray* rays;                 // compact: entry k belongs to slot ray_slot[k]
+    u32* ray_slot;
+    u32* ray_kind;
+    Ray* next_rays;
+    u32* next_slot;
+    u32* next_kind;
+    Hit* hits;                 // of rays
+    u32* sorted;               // entries of rays that hit, grouped by material
+    u32* material_first;       // per material: how many, then where its group begins, then its end
+    Ray* shadow_rays;
+    ShadowRay* shadows;
+    u32* shadow_kind;          // RAY_SHADOW, all of them
+    u8* blocked;
+    float* aovs;               // 4 floats for each of the film's AOVs, per entry of sorted; null: none
+    u32* counters;             // WaveCounter
+    u64* totals;               // WaveTotal
+};
+
+struct RenderTask {
+    RenderView scene;
+    FilmView film;  // of layer 0
+    Wavefront wave;
+};
+
+// One wave: pixels [first_pixel, first_pixel + pixel_count) of the film, each with samples [first_sample,
+// first_sample + sample_count), one layer each.
+struct WaveRange {
+    u32 first_pixel, pixel_count, first_sample, sample_count;
+};
+
+LUCH_FN PathState load_path(const Wavefront& wave, u32 slot) {
+    union Both {
+        PathWord words[PATH_WORDS];
+        PathState path;
+        LUCH_FN Both() : words{} {}
+    } both;
+    for (u32 i = 0; i < PATH_WORDS; ++i) both.words[i] = wave.paths[u64(i) * wave.slots + slot];
+    return both.path;
+}
+
+LUCH_FN void store_path(const Wavefront& wave, u32 slot, const PathState& path) {
+    union Both {
+        PathWord words[PATH_WORDS];
+        PathState path;
+        LUCH_FN Both() : words{} {}
+    } both;
+    both.path = path;
+    for (u32 i = 0; i < PATH_WORDS; ++i) wave.paths[u64(i) * wave.slots + slot] = both.words[i];
+}
+
+// Where a slot's path writes.
+LUCH_FN FilmWriter film_of_slot(const RenderTask& task, u32 slot) {
+    u32 layer = slot / task.wave.layer_pixels;
+    FilmWriter writer{task.film, 0};
+    writer.film.rows += u64(layer) * task.wave.layer_stride;
+    writer.film.sample_counts += u64(layer) * task.wave.film_pixels;
+    return writer;
+}
+
+}  // namespace luch

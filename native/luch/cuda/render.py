@@ -1,0 +1,285 @@
+"""Renders on a GPU: waves of paths through the stages of native/cuda/render, driven from here.
+
+``DeviceRenderer`` has the methods of ``core.render.Renderer`` that ``luch.render`` uses. The scene is read, and its
+lights are built, by the core on the host; the film's sums stay on the device until somebody asks for passes.
+"""
+
+from __future__ import annotations
+
+import struct
+import threading
+import time
+from typing import Any
+
+import numpy as np
+
+from luch._native import core
+from luch.cuda.compiler import load
+from luch.cuda.device import DeviceError, cupy, describe
+from luch.cuda.scene_kernels import SceneKernels
+from luch.cuda.trace import SceneTracer
+from luch.cuda.upload import DeviceCopy
+
+BLOCK = 128  # STAGE_BLOCK of render/stage.cuh
+# Paths under way at once. Fewer leave a large GPU idle in late bounces, more only cost memory.
+MOST_PATHS = 1 << 21
+FEWEST_PATHS = 1 << 14
+# Part of the free memory that a wavefront and its film may take.
+MEMORY_SHARE = 0.85
+RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
+COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed")  # WaveCounter
+TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
+          "light_points")  # WaveTotal  # fmt: skip
+
+
+class Memory:
+    """The film and the wavefront on the device, and their places in the RenderTask."""
+
+    def __init__(self, task: bytes, pixels: int, materials: int, paths: int) -> None:
+        cp, fields, sizes = cupy(), core.render.task_fields(), core.render.task_sizes()
+        self._fields, self._task = fields, bytearray(task)
+        stride = self.field("film.layout.stride", "<I")
+        aovs = self.field("film.layout.aov_count", "<I")
+        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != 0xFFFFFFFF)
+        self.layer_pixels = min(pixels, paths)
+        self.layers = max(1, paths // pixels)
+        slots = self.slots = self.layer_pixels * self.layers
+        self.pixels, self.stride = pixels, stride
+
+        def empty(count: int, kind: Any = np.uint8) -> Any:
+            return cp.empty(count, kind)
+
+        self.rows = cp.zeros((self.layers, pixels, stride), np.float64)
+        self.counts = cp.zeros((self.layers, pixels), np.uint32)
+        self.counters, self.totals = cp.zeros(sizes["counters"], np.uint32), cp.zeros(sizes["totals"], np.uint64)
+        self.arrays = {
+            "paths": empty(slots * sizes["path"]),
+            "rays": empty(slots * sizes["ray"]),
+            "ray_slot": empty(slots, np.uint32),
+            "ray_kind": empty(slots, np.uint32),
+            "next_rays": empty(slots * sizes["ray"]),
+            "next_slot": empty(slots, np.uint32),
+            "next_kind": empty(slots, np.uint32),
+            "hits": empty(slots * sizes["hit"]),
+            "sorted": empty(slots, np.uint32),
+            "material_first": cp.zeros(materials, np.uint32),
+            "shadow_rays": empty(slots * shadows * sizes["ray"]),
+            "shadows": empty(slots * shadows * sizes["shadow"]),
+            "shadow_kind": cp.full(slots * shadows, RAY_SHADOW, np.uint32),
+            "blocked": empty(slots * shadows),
+            "counters": self.counters,
+            "totals": self.totals,
+        }
+        if aovs:
+            self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
+        self._set("film.rows", "<Q", self.rows.data.ptr)
+        self._set("film.sample_counts", "<Q", self.counts.data.ptr)
+        self._set("wave.slots", "<I", slots)
+        self._set("wave.layer_pixels", "<I", self.layer_pixels)
+        self._set("wave.layer_stride", "<Q", pixels * stride)
+        self._set("wave.film_pixels", "<I", pixels)
+        for name, array in self.arrays.items():
+            self._set(f"wave.{name}", "<Q", array.data.ptr)
+        self.tasks = [bytes(self._task), b""]
+        for name in ("rays", "slot", "kind"):
+            own, following = ("rays", "next_rays") if name == "rays" else (f"ray_{name}", f"next_{name}")
+            self._set(f"wave.{own}", "<Q", self.arrays[following].data.ptr)
+            self._set(f"wave.{following}", "<Q", self.arrays[own].data.ptr)
+        self.tasks[1] = bytes(self._task)
+
+    def field(self, name: str, kind: str) -> int:
+        """A number of the task."""
+        value: int = struct.unpack_from(kind, self._task, self._fields[name])[0]
+        return value
+
+    def _set(self, name: str, kind: str, value: int) -> None:
+        struct.pack_into(kind, self._task, self._fields[name], value)
+
+    def address(self, name: str) -> int:
+        """Of an array on the device."""
+        return int(self.arrays[name].data.ptr)
+
+    def counter(self, name: str) -> int:
+        """Address of one of WaveCounter."""
+        return int(self.counters.data.ptr) + 4 * COUNTERS.index(name)
+
+    @property
+    def bytes(self) -> int:
+        """All of it."""
+        return int(self.rows.nbytes + self.counts.nbytes + sum(array.nbytes for array in self.arrays.values()))
+
+
+def bytes_per_path(stride: int, pixels: int) -> float:
+    """Device memory of one path under way: its state, its queues, and its part of a layer of the film."""
+    sizes = core.render.task_sizes()
+    queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + 2 * (sizes["ray"] + sizes["shadow"] + 5)
+    return float(sizes["path"] + queues + 8 * stride + 4)
+
+
+class DeviceRenderer:
+    """One scene on the current CUDA device. Raises DeviceError where there is none, or its memory is too small."""
+
+    def __init__(self, scene: Any) -> None:
+        """scene: luch.scene.Scene. Raises ValueError, naming the object, for data that does not fit together."""
+        cupy()
+        self._host = core.render.Renderer(scene, True)
+        self._scene = scene
+        self._lock = threading.Lock()
+        self._cancelled = False
+        self._waves_done = self._waves = 0
+        self._counts = {"paths": 0, "rays": 0, "shadow_rays": 0}
+        self._trace_seconds = 0.0
+        self._upload_seconds = 0.0
+        self._merged = True
+
+    @property
+    def device(self) -> str:
+        """For the statistics."""
+        return f"CUDA: {describe()['device']}"
+
+    def prepare(self) -> bool:
+        """Builds structures and lights, uploads them, makes the kernels. False when cancelled."""
+        if not self._host.prepare() or self._cancelled:
+            return False
+        began = time.perf_counter()
+        precision = self._scene.settings.precision
+        facts = self._host.device_facts()
+        (blocks, links), (tree_blocks, tree_links) = self._host.device_images()
+        self._arrays = DeviceCopy(blocks, links)
+        self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], precision, facts["one_group"])
+        self._upload_seconds = time.perf_counter() - began
+        self._paths = load("RENDER_PATHS", precision)
+        self._stages = SceneKernels(facts, blocks, precision)
+        film = self._scene.film
+        x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
+        self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]))
+        return not self._cancelled
+
+    def _allocate(self, pixels: int, materials: int) -> Memory:
+        """As large a wavefront as the device's memory allows, up to MOST_PATHS."""
+        cp = cupy()
+        free, _ = cp.cuda.runtime.memGetInfo()
+        fields, root = core.render.task_fields(), self._arrays.root
+        stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
+        fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels))
+        samples = max(1, self._scene.settings.samples)
+        paths = min(MOST_PATHS, fits, pixels * samples)
+        while paths >= min(FEWEST_PATHS, pixels):
+            try:
+                return Memory(root, pixels, materials, paths)
+            except cp.cuda.memory.OutOfMemoryError:
+                cp.get_default_memory_pool().free_all_blocks()
+                paths //= 2
+        raise DeviceError(
+            f"The GPU has {free / 2**30:.1f} GiB free; the film of this picture and {FEWEST_PATHS:,} paths need more. "
+            "Close what else uses the GPU, render a smaller picture or fewer passes, or use the CPU."
+        )
+
+    def render(self, first: int, count: int) -> bool:
+        """Traces samples [first, first + count) of every pixel. False when cancelled; waves are whole or not at all."""
+        memory, began = self._memory, time.perf_counter()
+        ranges = [
+            (pixel, min(memory.layer_pixels, memory.pixels - pixel), sample, min(memory.layers, first + count - sample))
+            for sample in range(first, first + count, memory.layers)
+            for pixel in range(0, memory.pixels, memory.layer_pixels)
+        ]
+        self._waves_done, self._waves = 0, len(ranges)
+        for wave in ranges:
+            if self._cancelled:
+                break
+            with self._lock:
+                self._trace_wave(*wave)
+            self._waves_done += 1
+        cupy().cuda.get_current_stream().synchronize()
+        self._trace_seconds += time.perf_counter() - began
+        return not self._cancelled
+
+    def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int) -> None:
+        memory, rays = self._memory, pixels * samples
+        self._merged = False
+        self._counts["paths"] += rays
+        self._launch(self._paths.kernel("begin_paths"), 0, rays, struct.pack("<4I", pixel, pixels, sample, samples))
+        turn = 0
+        while rays:
+            shadows = self._trace_round(turn, rays)
+            self._counts["rays"] += rays
+            self._counts["shadow_rays"] += shadows
+            turn ^= 1
+            rays = int(memory.counters[:1].get()[0])
+
+    def _trace_round(self, turn: int, rays: int) -> int:
+        """One event of every path; returns how many shadow rays were cast."""
+        memory, paths, stages = self._memory, self._paths, self._stages
+        following = "next_" if turn else ""
+        own_rays = memory.address(f"{following}rays")
+        kinds = memory.address("next_kind" if turn else "ray_kind")
+        self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"), memory.counter("traced"))
+        self._launch(stages.kernel("find_light"), turn, rays)
+        self._launch(paths.kernel("count_materials"), turn, rays)
+        self._launch(paths.kernel("place_materials"), turn, 1)
+        self._launch(paths.kernel("sort_hits"), turn, rays)
+        self._launch(stages.kernel("shade_surfaces"), turn, rays)
+        shadows = int(memory.counters[2:3].get()[0])
+        if shadows:
+            self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"), memory.address("blocked"),
+                             memory.counter("shadows"), memory.counter("shadowed"))  # fmt: skip
+            self._launch(stages.kernel("add_shadows"), turn, shadows, self._tracer.root)
+        self._launch(paths.kernel("next_round"), turn, 1)
+        return shadows
+
+    def _launch(self, kernel: Any, turn: int, threads: int, *more: bytes) -> None:
+        kernel.launch(-(-threads // BLOCK), BLOCK, [self._memory.tasks[turn], *more])
+
+    def cancel(self) -> None:
+        """Callable from any thread: render() returns within one wave's time."""
+        self._cancelled = True
+        self._host.cancel()
+
+    def step_progress(self) -> float:
+        """Share of the running step that is done, 0..1."""
+        return self._waves_done / self._waves if self._waves else 0.0
+
+    def _download(self) -> None:
+        """Brings the film's sums to the host, where passes are read from them."""
+        with self._lock:
+            if self._merged:
+                return
+            memory = self._memory
+            self._launch(self._paths.kernel("merge_layers"), 0, memory.pixels, struct.pack("<I", memory.layers))
+            rows, counts = self._host.film_arrays()
+            rows[...] = memory.rows[0].get()
+            counts[...] = memory.counts[0].get()
+            self._merged = True
+
+    def passes(self) -> dict[str, Any]:
+        """Blender's pass name -> float32 (H, W, C), bottom row first."""
+        self._download()
+        passes: dict[str, Any] = self._host.passes()
+        return passes
+
+    def deviations(self) -> tuple[Any, Any]:
+        """As core.render.Renderer's."""
+        self._download()
+        mean, deviation = self._host.deviations()
+        return mean, deviation
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, bytes and seconds, under the names of the CPU's."""
+        stats: dict[str, Any] = self._host.stats()
+        if not hasattr(self, "_memory"):
+            return stats
+        totals = dict(zip(TOTALS, (int(x) for x in self._memory.totals.get()), strict=True))
+        stats.update(self._counts)
+        stats["shadow_rays"] += totals.pop("transparent_rays")
+        stats.update(totals)
+        stats.update(
+            trace_seconds=self._trace_seconds,
+            upload_seconds=self._upload_seconds,
+            device_scene_bytes=self._arrays.bytes + self._tracer.bytes,
+            device_film_and_paths_bytes=self._memory.bytes,
+            paths_at_once=self._memory.slots,
+            path_bytes=core.render.task_sizes()["path"],
+            kernels="general" if self._stages.general else "the scene's own",
+            kernel_compile_seconds=self._stages.compile_seconds,
+        )
+        return stats

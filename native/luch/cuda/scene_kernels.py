@@ -1,0 +1,82 @@
+"""The stages of the wavefront for one scene: compiled for it, or the general ones until those are ready."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+import time
+from typing import Any
+
+import numpy as np
+
+from luch.cuda import compiler
+from luch.cuda.device import DeviceError, Kernel, Module, architecture_of, cupy
+from luch.cuda.programs import INSTRUCTION, Linked, source
+
+STAGES = "RENDER_STAGES"
+# Registers of the interpreter of the general kernels (native/cuda/render/interpreter.cuh).
+INTERPRETER_REGISTERS = 256
+
+
+class SceneKernels:
+    """``kernel(name)`` is the best that is there at the moment; asked anew at every wave."""
+
+    def __init__(self, facts: dict[str, Any], blocks: list[tuple[str, Any]], precision: str) -> None:
+        """facts, blocks: core.render.Renderer.device_facts and its RenderTask's blocks."""
+        arrays = dict(blocks)
+        programs = [Linked(*row) for row in facts["programs"]]
+        instructions = np.frombuffer(arrays["instructions"], INSTRUCTION)
+        self._text = source(programs, instructions, np.frombuffer(arrays["operands"], np.uint32))
+        structure = "".join(part.capitalize() for part in facts["structure"].split("_"))
+        self._flags = [
+            "-DLUCH_SCENE_PROGRAMS",
+            f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
+            f"-DLUCH_STRUCTURE={structure}",
+        ]
+        self._precision = precision
+        self._module: Module | None = None
+        self._ready: bytes | None = None
+        self._failure: BaseException | None = None
+        self.compile_seconds = 0.0
+        self.general = False
+        self._start(facts)
+
+    def _start(self, facts: dict[str, Any]) -> None:
+        architecture = architecture_of(cupy())
+        kept = compiler.kept_scene(STAGES, self._precision, architecture, self._text, self._flags)
+        if kept is not None:
+            self._module = Module(kept)
+            return
+        usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
+        general = compiler.ahead(STAGES, self._precision, architecture) if usable else None
+        if general is None:
+            self._compile(architecture)
+            self._take()
+            return
+        self._module, self.general = Module(general), True
+        threading.Thread(target=self._compile, args=(architecture,), daemon=True).start()
+
+    def _compile(self, architecture: int) -> None:
+        began = time.perf_counter()
+        try:
+            self._ready = compiler.compiled_scene(STAGES, self._precision, architecture, self._text, self._flags)
+        except Exception as error:  # handed to the thread that renders, which raises it
+            self._failure = error
+        self.compile_seconds = time.perf_counter() - began
+
+    def _take(self) -> None:
+        if self._failure is not None:
+            raise DeviceError(f"The kernels of this scene do not compile: {self._failure}") from self._failure
+        if self._ready is not None:
+            self._module, self._ready, self.general = Module(self._ready), None, False
+
+    def kernel(self, name: str) -> Kernel:
+        """Between two waves the scene's own kernels take over from the general ones: the same results."""
+        self._take()
+        assert self._module is not None
+        return self._module.kernel(name)
+
+    @property
+    def key(self) -> str:
+        """Names the code: two scenes with the same one share their kernels."""
+        return hashlib.sha256("\0".join([self._text, *self._flags]).encode()).hexdigest()[:16]

@@ -1,0 +1,22 @@
+"""Words behind `--` on Blender's command line."""
+
+from __future__ import annotations
+
+import pytest
+
+from addon.command_line import CommandLineError, overrides
+
+
+def test_words_of_others_are_left_alone() -> None:
+    assert overrides(("blender", "-b", "x.blend", "--luch-device", "CUDA")) == {}  # Blender's own part
+    assert overrides(("blender", "--", "--cycles-device", "OPTIX", "file")) == {}
+
+
+def test_the_device_is_named_in_either_case() -> None:
+    assert overrides(("blender", "--", "--other", "--luch-device", "cuda")) == {"device": "CUDA"}
+
+
+@pytest.mark.parametrize("words", [("--luch-device", "TPU"), ("--luch-devise", "CUDA"), ("--luch-device",)])
+def test_a_misspelt_option_is_told(words: tuple[str, ...]) -> None:
+    with pytest.raises(CommandLineError, match=r"--luch-device CPU\|CUDA"):
+        overrides(("blender", "--", *words))
