@@ -60,10 +60,12 @@ class ArrayAccel {
         cpu::AccelStats s = accel_->stats();
         py::dict out;
         out["triangles"] = s.triangles;
+        out["spheres"] = s.spheres;
         out["nodes"] = s.nodes;
         out["leaf_blocks"] = s.leaf_blocks;
         out["bytes"] = s.bytes;
         out["dropped_triangles"] = s.dropped_triangles;
+        out["dropped_spheres"] = s.dropped_spheres;
         out["build_seconds"] = s.build_seconds;
         return out;
     }

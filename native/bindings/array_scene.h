@@ -17,7 +17,7 @@ using ByteArray = py::array_t<u8, py::array::c_style>;
 struct ArrayScene {
     // meshes: (M, 6) first vertex, vertices, first triangle, triangles, first sphere, spheres; or (M, 4) without the
     // last two. instance_meshes: (I,). to_world and to_object: (I, 12). visibility: (I,) RayKind bits. flags: one per
-    // triangle, or none. spheres: (S, 4) centre, radius.
+    // triangle, then perhaps one per sphere; or none. spheres: (S, 4) centre, radius.
     ArrayScene(const FloatArray& positions, const IndexArray& triangles, const ByteArray& flags,
                const IndexArray& meshes, const IndexArray& instance_meshes, const FloatArray& to_world,
                const FloatArray& to_object, const IndexArray& visibility, const FloatArray& spheres);

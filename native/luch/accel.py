@@ -79,7 +79,6 @@ class Accel:
             if flags.shape != (count,):
                 raise ValueError(f"may_be_transparent has shape {flags.shape}; it must be ({count},).")
         self.kind, self.precision, self.device = kind, precision, device
-        self._triangle_count = len(corners)
         self._precision: Any = PRECISIONS.index(precision)
         self._wide: Any = None
         self._structure: Any = None
@@ -95,15 +94,11 @@ class Accel:
                 self._structure = DeviceStructure.uploaded(host, kind, points, corners, balls, flags)
             self._precision = precision
         elif kind == "BVH":
-            mesh = np.array([[0, len(points), 0, len(corners)]], np.uint32)
+            mesh = np.array([[0, len(points), 0, len(corners), 0, len(balls)]], np.uint32)
             here = np.eye(3, 4, dtype=np.float32).reshape(1, 12)
             self._wide = core.ArrayAccel(
                 points, corners, flags, mesh, np.zeros(1, np.uint32), here, here, np.full(1, 63, np.uint32),
-                -1, QUALITIES.index(quality), self._precision, threads, 0, balls[:0])  # fmt: skip
-            if len(balls):  # a tree of their own: the wide tree's blocks hold triangles
-                self._structure = core.ArrayStructure(
-                    points, np.full_like(corners, 0xFFFFFFFF), balls, flags, STRUCTURES.index("BVH2"),
-                    QUALITIES.index(quality), threads)  # fmt: skip
+                -1, QUALITIES.index(quality), self._precision, threads, 0, balls)  # fmt: skip
         else:
             number, detail = STRUCTURES.index(kind), QUALITIES.index(quality)
             self._structure = core.ArrayStructure(points, corners, balls, flags, number, detail, threads)
@@ -120,24 +115,17 @@ class Accel:
             t, prim, u, v, _ = self._structure.closest(given, self._precision, False)
             return t, prim, u, v
         t, prim, u, v, _ = self._wide.closest(given, _ALL_KINDS)
-        if self._structure is not None:
-            ball_t, ball, _, _, _ = self._structure.closest(given, self._precision, False)
-            nearer = ball_t < t  # of equal ones the triangle: its number is the smaller
-            t, prim = np.where(nearer, ball_t, t), np.where(nearer, ball, prim)
-            u, v = np.where(nearer, np.float32(0), u), np.where(nearer, np.float32(0), v)
         return t, prim, u, v
 
     def blocked(self, rays: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         """What lies in each ray's interval: 0 nothing, 1 something opaque, 2 only what may be transparent."""
         given = self._rays(rays)
+        result: npt.NDArray[np.uint8]
         if self._wide is None:
-            result: npt.NDArray[np.uint8] = self._structure.any(given, self._precision, False)[0]
-            return result
-        found = [self._wide.any(given, _ALL_KINDS)]
-        if self._structure is not None:
-            found.append(self._structure.any(given, self._precision, False)[0])
-        opaque = np.any([each == 1 for each in found], axis=0)
-        return np.where(opaque, np.uint8(1), np.max(found, axis=0))
+            result = self._structure.any(given, self._precision, False)[0]
+        else:
+            result = self._wide.any(given, _ALL_KINDS)
+        return result
 
     def any(self, rays: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Whether each ray hits anything. rays: (N, 8) float32; returns (N,) bool."""
@@ -148,15 +136,17 @@ class Accel:
         """The work of tracing these rays, all together: nodes, boxes (or planes), primitives tested, bytes read.
 
         Traced by code compiled with counters, one ray after the other; `closest` and `any` have none. The eight-wide
-        tree tests the eight boxes of a node at once, and the triangles of a block (one to four): each of them is counted.
+        tree tests the eight boxes of a node at once, and the triangles of a block (one to four) or its spheres (one to
+        eight): each of them is counted.
         """
         given = self._rays(rays)
-        counts: dict[str, int] = {} if self._wide is None else self._wide.count(given, any_hit)
-        if self._structure is None:
-            return counts
-        trace = self._structure.any if any_hit else self._structure.closest
-        own: dict[str, int] = trace(given, self._precision, True)[-1]
-        return {name: value + counts.get(name, 0) for name, value in own.items()}
+        result: dict[str, int]
+        if self._wide is not None:
+            result = self._wide.count(given, any_hit)
+        else:
+            trace = self._structure.any if any_hit else self._structure.closest
+            result = trace(given, self._precision, True)[-1]
+        return result
 
     @property
     def on_device(self) -> Any:
@@ -175,17 +165,8 @@ class Accel:
 
     @property
     def stats(self) -> dict[str, float]:
-        """Counts of the structure: its primitives (triangles), nodes, bytes, and how many primitives were dropped."""
-        if self._wide is None:
-            return dict(self._structure.stats())
-        result: dict[str, float] = self._wide.stats()
-        if self._structure is not None:
-            balls = self._structure.stats()
-            result["spheres"] = balls["primitives"]
-            result["nodes"] += balls["nodes"]
-            result["bytes"] += balls["bytes"] + 16 * balls["primitives"]
-            result["dropped_triangles"] += balls["dropped"] - self._triangle_count  # it was given none of them
-        return result
+        """Counts of the structure: its primitives (triangles, spheres), nodes, bytes, and how many were dropped."""
+        return dict((self._wide or self._structure).stats())
 
 
 def _one_of(given: str, names: tuple[str, ...], what: str) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
-from luch.accel import KINDS, Accel, Kind
+from luch.accel import KINDS, PRECISIONS, QUALITIES, Accel, Kind
 from luch.render import Result, render
 from luch.scene import Attribute, Camera, Film, Instances, Light, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder
@@ -149,6 +150,36 @@ def test_of_a_negative_radius_only_the_outside_is_there(kind: Kind) -> None:
     lonely = Accel(*none, kind=kind, spheres=outsides[:1])
     rays[:, :3] = outsides[0, :3]
     assert not lonely.any(rays).any() and (lonely.closest(rays)[1] == -1).all()
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize("quality", QUALITIES)
+@pytest.mark.parametrize("away", [0.0, 1e3, 1e7])
+def test_the_eight_wide_tree_hits_spheres_as_brute_force_does(precision: Any, quality: Any, away: float) -> None:
+    """Of sizes from nothing to the whole scene, one-sided and two-sided, beside triangles, some transparent."""
+    rng = np.random.default_rng(11)
+    radii = 10.0 ** rng.uniform(-6, 0.3, 900) * rng.choice([-1.0, 1.0], 900)
+    spheres = np.concatenate([away + rng.uniform(-2, 2, (900, 3)), radii[:, None]], axis=1).astype(np.float32)
+    spheres[::50, 3] = 0.0
+    spheres[7] = np.nan
+    points, triangles = icosphere(3)
+    shared = {
+        "precision": precision,
+        "spheres": spheres,
+        "may_be_transparent": rng.random(len(triangles) + 900) < 0.7,
+        "threads": 1,
+    }
+    mesh = points + np.float32(away), triangles
+    ours, truth = Accel(*mesh, kind="BVH", quality=quality, **shared), Accel(*mesh, kind="BRUTE_FORCE", **shared)
+    assert ours.stats["spheres"] == 900 - 18 - 1 and ours.stats["dropped_spheres"] == 19
+    rays = random_rays(1500, center=away)
+    rays[::3, 4:7] = spheres[rng.integers(8, 900, 500), :3] + 0.001 * rng.normal(size=(500, 3)) - rays[::3, :3]
+    rays = rays[np.isfinite(rays[:, :7]).all(axis=1)]
+    hits = truth.closest(rays)
+    assert (hits[1] >= len(triangles)).sum() > 100
+    for a, b in zip(ours.closest(rays), hits, strict=True):
+        assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
+    assert np.array_equal(ours.blocked(rays), truth.blocked(rays))
 
 
 SIZES = [(0.0, 1.0), (0.0, 1e-6), (0.0, 1e6), (1e4, 1.0), (1e4, 0.05), (1e6, 100.0)]
