@@ -69,8 +69,8 @@ def cryptomatte_depth(view_layer: Any) -> int:
     return int((min(16, view_layer.pass_cryptomatte_depth) + 1) // 2 * 2)
 
 
-def enabled_passes(view_layer: Any) -> Iterator[RenderPass]:
-    """The passes of a view layer, Combined first, in the order Blender's compositor shows them."""
+def _own_passes(view_layer: Any) -> Iterator[RenderPass]:
+    """Passes that Luch gives their names, Combined first."""
     yield RenderPass("Combined", "RGBA", "COLOR")
     for entry in TABLE:
         switches = [entry.enabled_by, CYCLES_SWITCHES.get(entry.enabled_by, entry.enabled_by)]
@@ -80,9 +80,21 @@ def enabled_passes(view_layer: Any) -> Iterator[RenderPass]:
         for index in range(cryptomatte_depth(view_layer) // 2):
             # Lower-case channels: OpenEXR's lossy DWA leaves those exact, and the values are bit patterns.
             yield RenderPass(f"Crypto{kind}{index:02d}", "rgba", "COLOR")
-    for aov in view_layer.aovs:
-        if aov.is_valid:
-            yield RenderPass(aov.name, "X", "VALUE") if aov.type == "VALUE" else RenderPass(aov.name, "RGBA", "COLOR")
+
+
+def enabled_aovs(view_layer: Any) -> tuple[list[Any], list[str]]:
+    """The AOVs that are rendered, and the names of those that cannot be: another pass has that name."""
+    taken = {entry.name for entry in _own_passes(view_layer)}
+    taken |= {f"Combined_{group.name}" for group in view_layer.lightgroups}
+    valid = [aov for aov in view_layer.aovs if aov.is_valid]
+    return [aov for aov in valid if aov.name not in taken], [aov.name for aov in valid if aov.name in taken]
+
+
+def enabled_passes(view_layer: Any) -> Iterator[RenderPass]:
+    """The passes of a view layer, Combined first, in the order Blender's compositor shows them; no name twice."""
+    yield from _own_passes(view_layer)
+    for aov in enabled_aovs(view_layer)[0]:
+        yield RenderPass(aov.name, "X", "VALUE") if aov.type == "VALUE" else RenderPass(aov.name, "RGBA", "COLOR")
     for group in view_layer.lightgroups:
         yield RenderPass(f"Combined_{group.name}", "RGB", "COLOR")
 

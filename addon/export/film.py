@@ -16,6 +16,9 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
     """What the film records. size: full frame in pixels, None for the scene's own resolution."""
     scene, view_layer = context.scene, context.view_layer
     render = scene.render
+    aovs, unnamed = passes.enabled_aovs(view_layer)
+    for name in unnamed:
+        context.warn(f'View layer "{view_layer.name}": AOV "{name}" has the name of another pass. Rename it.')
     scale = render.resolution_percentage / 100.0
     width, height = size or (int(render.resolution_x * scale), int(render.resolution_y * scale))
     film = Film(
@@ -33,7 +36,7 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
         passes=[entry.name for entry in passes.enabled_passes(view_layer)],
         cryptomatte_depth=passes.cryptomatte_depth(view_layer),
         lightgroups=[group.name for group in view_layer.lightgroups],
-        aovs=[(aov.name, aov.type) for aov in view_layer.aovs if aov.is_valid],
+        aovs=[(aov.name, aov.type) for aov in aovs],
     )
     if scene.world is not None:
         mist = scene.world.mist_settings

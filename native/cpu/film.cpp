@@ -73,7 +73,7 @@ class LayoutBuilder {
     }
 
     void add(const std::string& name) {
-        if (std::any_of(passes.begin(), passes.end(), [&](const Pass& pass) { return pass.name == name; })) return;
+        if (exists(name) || is_named_elsewhere(name)) return;
         if (name == "Sample Count" || name == "Debug Sample Count") {
             passes.push_back({name, 1, PassKind::SAMPLE_COUNT, NONE});
             return;
@@ -82,7 +82,7 @@ class LayoutBuilder {
             passes.push_back({name, 3, PassKind::HALF, layout.half});
             return;
         }
-        if (add_known(name) || add_crypto(name) || is_named_elsewhere(name)) return;
+        if (add_known(name) || add_crypto(name)) return;
         throw std::invalid_argument("Film: pass \"" + name +
                                     "\" is not known. Use Blender's names, e.g. \"Diffuse Direct\".");
     }
@@ -93,7 +93,7 @@ class LayoutBuilder {
         layout.lightgroups = take(3 * layout.lightgroup_count);
         layout.any_light_pass = 1;
         for (u32 i = 0; i < layout.lightgroup_count; ++i)
-            passes.push_back({"Combined_" + spec_.lightgroups[i], 3, PassKind::LIGHT, layout.lightgroups + 3 * i});
+            add_named({"Combined_" + spec_.lightgroups[i], 3, PassKind::LIGHT, layout.lightgroups + 3 * i});
     }
 
     void add_aovs() {
@@ -102,13 +102,23 @@ class LayoutBuilder {
         layout.aovs = take(4 * layout.aov_count);
         layout.any_data_pass = 1;
         for (u32 i = 0; i < layout.aov_count; ++i)
-            passes.push_back({spec_.aovs[i].name, spec_.aovs[i].color ? 4u : 1u, PassKind::MEAN, layout.aovs + 4 * i});
+            add_named({spec_.aovs[i].name, spec_.aovs[i].color ? 4u : 1u, PassKind::MEAN, layout.aovs + 4 * i});
     }
 
     FilmLayout layout{};
     std::vector<Pass> passes;
 
  private:
+    bool exists(const std::string& name) const {
+        return std::any_of(passes.begin(), passes.end(), [&](const Pass& pass) { return pass.name == name; });
+    }
+
+    void add_named(const Pass& pass) {
+        if (exists(pass.name))
+            throw std::invalid_argument("Film: two passes are named \"" + pass.name + "\". Rename one.");
+        passes.push_back(pass);
+    }
+
     u32 take(u32 channels) {
         u32 first = layout.stride;
         layout.stride += channels;

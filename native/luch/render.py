@@ -161,7 +161,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     fit together, naming the object.
     """
     start = time.perf_counter()
-    wants_error = ERROR_PASS in scene.film.passes
+    wants_error = ERROR_PASS in scene.film.passes and ERROR_PASS not in (name for name, _ in scene.film.aovs)
     settings = replace(scene.settings, estimate_error=scene.settings.estimate_error or wants_error)
     film = replace(scene.film, passes=[name for name in scene.film.passes if name != ERROR_PASS])
     traced = replace(scene, film=film, settings=settings)

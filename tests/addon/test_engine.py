@@ -90,6 +90,23 @@ def test_every_pass_arrives_under_blenders_name(room: bpy.types.Scene) -> None:
     assert {name: passes[name].shape[2] for name in expected} == expected
 
 
+def test_an_aov_may_have_the_name_of_a_pass_that_is_off(room: bpy.types.Scene) -> None:
+    layer = room.view_layers[0]
+    for name in ("Depth", "Error", "Sample Count", "Combined_Key", "CryptoObject00"):
+        layer.aovs.add().name = name
+    passes = picture(room)
+    assert passes["Depth"].shape[2] == passes["Error"].shape[2] == passes["CryptoObject00"].shape[2] == 4
+    layer.luch.use_pass_error = True
+    layer.lightgroups.add().name = "Key"
+    passes = picture(room)
+    assert passes["Error"].shape[2] == passes["Combined_Key"].shape[2] == 3
+    warnings = engine.last_stats[room.name]["warnings"]
+    assert [name for name in ("Depth", "Error", "Combined_Key") if any(f'"{name}"' in text for text in warnings)] == [
+        "Error",
+        "Combined_Key",
+    ]
+
+
 def test_a_cropped_border_is_as_large_as_blender_wants_it(room: bpy.types.Scene) -> None:
     render = room.render
     render.use_border = render.use_crop_to_border = True

@@ -93,6 +93,13 @@ def test_an_unknown_pass_is_named() -> None:
         make(passes=["Diffuse Dirct"])
     with pytest.raises(ValueError, match="region is empty"):
         make(width=0)
+
+
+def test_no_two_passes_have_one_name() -> None:
+    film = make(passes=["Combined", "Depth"], aovs=[("Depth", "COLOR")])
+    assert film.resolve()["Depth"].shape[2] == 4, "the user's own"
+    with pytest.raises(ValueError, match='two passes are named "Combined_key"'):
+        make(lightgroups=["key"], aovs=[("Combined_key", "COLOR")])
     with pytest.raises(ValueError, match="border"):
         make(border=(0, 0, 3, 1))
 
