@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,9 @@ class SceneTracer:
     def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, one_group: bool) -> None:
         """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for."""
         self._trees = DeviceCopy(blocks, links)
+        self._module = load(f"TRACE_{kind}", precision)
         one = "_one" if one_group and kind == "CWBVH" else ""
-        module = load(f"TRACE_{kind}", precision)
-        self._closest, self._any = module.kernel(f"trace_closest{one}"), module.kernel(f"trace_any{one}")
+        self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
 
     @property
     def root(self) -> Any:
@@ -34,6 +35,10 @@ class SceneTracer:
     def bytes(self) -> int:
         """On the device."""
         return self._trees.bytes
+
+    def kernel(self, name: str) -> Kernel:
+        """One of the module's."""
+        return self._module.kernel(name)
 
     def closest(self, rays: int, kinds: int, hits: int, count: int, following: int) -> None:
         """Puts it on the current stream. All are addresses on the device.
@@ -50,21 +55,30 @@ class SceneTracer:
     def _launch(self, kernel: Kernel, *task: int) -> None:
         kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, [self._trees.root, struct.pack("<6Q", *task)])
 
-    def closest_of(self, rays: Any, kinds: Any = None) -> Any:
+    def closest_of(self, rays: Any, kinds: Any = None, kernel: str = "") -> Any:
         """rays (N, 8) float32, kinds (N,) uint32 or None: NumPy in, HIT (N,) out. For tests and races."""
-        return self._traced(self._closest, rays, kinds, HIT)
+        results, run = self.launcher(self.kernel(kernel) if kernel else self._closest, rays, kinds)
+        run()
+        return cupy().asnumpy(results).view(HIT)
 
-    def any_of(self, rays: Any, kinds: Any = None) -> Any:
+    def any_of(self, rays: Any, kinds: Any = None, kernel: str = "") -> Any:
         """As above; Blocked values (N,) uint8."""
-        return self._traced(self._any, rays, kinds, np.dtype(np.uint8))
+        results, run = self.launcher(self.kernel(kernel) if kernel else self._any, rays, kinds)
+        run()
+        return cupy().asnumpy(results)
 
-    def _traced(self, kernel: Kernel, rays: Any, kinds: Any, result: Any) -> Any:
-        cp, count = cupy(), len(rays)
+    def launcher(self, kernel: Kernel, rays: Any, kinds: Any = None) -> tuple[Any, Callable[[], None]]:
+        """The results' bytes on the device, and what traces the rays into them, again and again."""
+        cp, blocked = cupy(), kernel.name.startswith("trace_any")
         rays = cp.asarray(rays)
-        kinds = cp.zeros(0, np.uint32) if kinds is None else cp.asarray(kinds)
-        out = cp.zeros(count * result.itemsize, np.uint8)
-        counts = cp.asarray(np.array([count, 0], np.uint32))
-        outputs = (out.data.ptr, 0) if result == HIT else (0, out.data.ptr)
-        self._launch(kernel, rays.data.ptr, kinds.data.ptr if kinds.size else 0, *outputs, counts.data.ptr,
-                     counts.data.ptr + 4)  # fmt: skip
-        return cp.asnumpy(out).view(result)
+        kinds = None if kinds is None or not len(kinds) else cp.asarray(kinds)
+        results = cp.zeros(len(rays) * (1 if blocked else HIT.itemsize), np.uint8)
+        counts = cp.asarray(np.array([len(rays), 0], np.uint32))
+
+        def run() -> None:
+            counts[1:] = 0
+            outputs = (0, results.data.ptr) if blocked else (results.data.ptr, 0)
+            self._launch(kernel, rays.data.ptr, 0 if kinds is None else kinds.data.ptr, *outputs, counts.data.ptr,
+                         counts.data.ptr + 4)  # fmt: skip
+
+        return results, run
