@@ -143,7 +143,8 @@ def _compile(nvrtc: Any, unit: _Unit) -> bytes:
     target = f"sm_{architecture}" if architecture in known else f"compute_{max(known)}"  # the driver compiles PTX on
     options = [f"-arch={target}", f"-I{include}", f"-I{kernels}", *flags(unit.precision), *unit.defines]
     source = source_of(module)
-    headers = ((unit.programs,), (SCENE_PROGRAMS,)) if unit.programs else ((), ())
+    # CuPy wants bytes here, and only here.
+    headers = ((unit.programs.encode(),), (SCENE_PROGRAMS.encode(),)) if unit.programs else ((), ())
     program = nvrtc.createProgram(source.read_text(encoding="utf-8"), str(source), *headers)
     try:
         nvrtc.compileProgram(program, tuple(options))
