@@ -132,11 +132,17 @@ def test_the_image_leads_every_pointer_into_a_block() -> None:
         assert target_offset <= len(blocks[target][1])
 
 
-def test_trees_do_not_depend_on_the_number_of_threads() -> None:
-    scene = crowd(40)
-    (ours, links), (theirs, their_links) = (scene.trees(threads=threads).device_image() for threads in (1, 3))
+def test_large_trees_do_not_depend_on_the_number_of_threads() -> None:
+    scene = crowd(9)
+    scene.meshes.append(icosphere(6))  # 82 thousand triangles: several threads build it
+    scene.instances += [(3, placed(np.random.default_rng(5), 5.0), ALL), (3, np.eye(3, 4), ALL)]
+    trees = [scene.trees(threads=threads) for threads in (1, 3)]
+    (ours, links), (theirs, their_links) = (t.device_image() for t in trees)
     assert links == their_links
     with_pointers = {block for block, *_ in links}
     for block, ((name, data), (their_name, their_data)) in enumerate(zip(ours, theirs, strict=True)):
         assert name == their_name
         assert block in with_pointers or np.array_equal(data, their_data)
+    rays = random_rays(2000, scale=3.0)
+    for a, b in zip(trees[1].closest(rays, NO_KINDS), scene.build().closest(rays, NO_KINDS), strict=True):
+        assert np.array_equal(a.view(np.uint32), b.view(np.uint32))

@@ -7,6 +7,7 @@ namespace luch::cpu {
 namespace {
 
 constexpr u32 CHUNK = 16384;  // leaf primitives a thread takes at once
+constexpr u32 TASK_PRIMITIVES = 16384;  // smaller subtrees are made by one thread each
 // One node is eight boxes, decoded: two to three tests of a triangle in double.
 constexpr Collapse::Costs COSTS = {1.0f, 0.4f, CWBVH_LEAF};
 
@@ -106,27 +107,31 @@ void quantise(const Tree2& tree, const Bvh2Node& parent, const WideChild* childr
     }
 }
 
-CwbvhNodes make_nodes(const Tree2& tree, const Collapse& collapse) {
-    struct Open {
-        u32 from, to, level;
-    };
-    CwbvhNodes out;
-    out.refs.reserve(tree.refs.size());
-    out.nodes.reserve(tree.nodes.size() / 8 + 1);
-    out.nodes.resize(1);
-    std::vector<Open> open = {{0, 0, 0}};
+// A wide node that is still to be made of a binary one.
+struct Open {
+    u32 from, to, level;
+};
+
+// Makes nodes below those that are open, out.nodes[open.to] each. later: where those of few primitives are left; null:
+// none are.
+void make_nodes(const Tree2& tree, const Collapse& collapse, std::vector<Open> open, std::vector<Open>* later,
+                CwbvhNodes* out) {
     while (!open.empty()) {
         Open o = open.back();
         open.pop_back();
-        out.depth = std::max(out.depth, o.level);
+        if (later && collapse.primitives_below(o.from) <= TASK_PRIMITIVES) {
+            later->push_back(o);
+            continue;
+        }
+        out->depth = std::max(out->depth, o.level);
         WideChild children[8];
         int place[8], at[8], count = collapse.children(o.from, children);
         choose_places(tree, tree.nodes[o.from], children, count, place);
         for (int& c : at) c = -1;
         for (int c = 0; c < count; ++c) at[place[c]] = c;
         CwbvhNode node = {};
-        node.first_child = u32(out.nodes.size());
-        node.first_leaf = u32(out.refs.size());
+        node.first_child = u32(out->nodes.size());
+        node.first_leaf = u32(out->refs.size());
         u32 inner = 0;
         for (int p = 0; p < 8; ++p) {
             if (at[p] < 0) continue;
@@ -138,14 +143,28 @@ CwbvhNodes make_nodes(const Tree2& tree, const Collapse& collapse) {
                 continue;
             }
             u32 refs[CWBVH_LEAF], size = collapse.refs_below(child.node, refs);
-            set_byte(node.meta, p, ((1u << size) - 1u) << 5 | (u32(out.refs.size()) - node.first_leaf));
-            out.refs.insert(out.refs.end(), refs, refs + size);
+            set_byte(node.meta, p, ((1u << size) - 1u) << 5 | (u32(out->refs.size()) - node.first_leaf));
+            out->refs.insert(out->refs.end(), refs, refs + size);
         }
         quantise(tree, tree.nodes[o.from], children, count, place, &node);
-        out.nodes.resize(out.nodes.size() + inner);
-        out.nodes[o.to] = node;
+        out->nodes.resize(out->nodes.size() + inner);
+        out->nodes[o.to] = node;
     }
-    return out;
+}
+
+// Puts a subtree behind the others, its root where the top left room for it.
+void append(const CwbvhNodes& part, u32 root, CwbvhNodes* out) {
+    u32 nodes = u32(out->nodes.size()) - 1, refs = u32(out->refs.size());  // its root is not among them
+    out->nodes.insert(out->nodes.end(), part.nodes.begin() + 1, part.nodes.end());
+    out->refs.insert(out->refs.end(), part.refs.begin(), part.refs.end());
+    out->nodes[root] = part.nodes[0];
+    auto move = [&](CwbvhNode& node) {
+        node.first_child += nodes;
+        node.first_leaf += refs;
+    };
+    move(out->nodes[root]);
+    for (size_t n = nodes + 1; n < out->nodes.size(); ++n) move(out->nodes[n]);
+    out->depth = std::max(out->depth, part.depth);
 }
 
 LeafPrimitive leaf_primitive(const Primitives& all, u32 ref) {
@@ -194,7 +213,26 @@ class CompressedTree final : public StructureOf<Cwbvh> {
 }  // namespace
 
 CwbvhNodes build_cwbvh_nodes(const Tree2& tree, const Collapse::Costs& costs, ThreadPool& pool) {
-    CwbvhNodes out = make_nodes(tree, Collapse(tree, costs, pool));
+    Collapse collapse(tree, costs, pool);
+    CwbvhNodes out;
+    out.nodes.resize(1);
+    std::vector<Open> later;
+    make_nodes(tree, collapse, {{0, 0, 0}}, &later, &out);
+    std::vector<CwbvhNodes> parts(later.size());
+    pool.parallel_for(later.size(), 1, [&](size_t begin, size_t end, unsigned) {
+        for (size_t i = begin; i < end; ++i) {
+            parts[i].nodes.resize(1);
+            make_nodes(tree, collapse, {{later[i].from, 0, later[i].level}}, nullptr, &parts[i]);
+        }
+    });
+    size_t nodes = out.nodes.size(), refs = out.refs.size();
+    for (const CwbvhNodes& part : parts) {
+        nodes += part.nodes.size() - 1;
+        refs += part.refs.size();
+    }
+    out.nodes.reserve(nodes);
+    out.refs.reserve(refs);
+    for (size_t i = 0; i < parts.size(); ++i) append(parts[i], later[i].to, &out);
     if (out.depth > CWBVH_MAX_DEPTH) throw std::length_error("The wide tree is too deep.");
     return out;
 }

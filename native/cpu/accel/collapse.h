@@ -25,6 +25,7 @@ class Collapse {
     double cost() const { return double(best_[0].cost[0]) / double(scale_) / double(scale_); }
     // The children of the wide node that a binary node becomes; the root may be a leaf, then it is its own child.
     int children(u32 node, WideChild* out) const;
+    u32 primitives_below(u32 node) const { return best_[node].primitives; }
     // The refs below a node, each once, ascending; at most max_leaf.
     u32 refs_below(u32 node, u32* out) const;
 
