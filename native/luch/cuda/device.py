@@ -53,6 +53,11 @@ def available() -> bool:
     return True
 
 
+def enter_context() -> None:
+    """Makes the device's context the current one of this thread: the driver's own calls ask for it."""
+    cupy().cuda.runtime.free(0)
+
+
 def is_device_array(array: object) -> bool:
     """Whether an array lies on a GPU (CuPy's, PyTorch's, ...)."""
     return hasattr(array, "__cuda_array_interface__")
@@ -133,7 +138,7 @@ class Module:
     """A loaded cubin or PTX; stays loaded as long as the process."""
 
     def __init__(self, image: bytes) -> None:
-        cupy().cuda.runtime.free(0)  # makes the device's context current
+        enter_context()
         self._module = cupy().cuda.driver.moduleLoadData(image)
         self._kernels: dict[str, Kernel] = {}
 

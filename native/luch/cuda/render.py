@@ -15,7 +15,7 @@ import numpy as np
 
 from luch._native import core
 from luch.cuda.compiler import load
-from luch.cuda.device import DeviceError, cupy, describe
+from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.trace import SceneTracer
 from luch.cuda.upload import DeviceCopy
@@ -141,6 +141,7 @@ class DeviceRenderer:
         """Builds structures and lights, uploads them, makes the kernels. False when cancelled."""
         if not self._host.prepare() or self._cancelled:
             return False
+        enter_context()
         began = time.perf_counter()
         precision = self._scene.settings.precision
         facts = self._host.device_facts()
@@ -177,6 +178,7 @@ class DeviceRenderer:
 
     def render(self, first: int, count: int) -> bool:
         """Traces samples [first, first + count) of every pixel. False when cancelled; waves are whole or not at all."""
+        enter_context()
         memory, began = self._memory, time.perf_counter()
         ranges = [
             (pixel, min(memory.layer_pixels, memory.pixels - pixel), sample, min(memory.layers, first + count - sample))
@@ -244,6 +246,7 @@ class DeviceRenderer:
         with self._lock:
             if self._merged:
                 return
+            enter_context()
             memory = self._memory
             self._launch(self._paths.kernel("merge_layers"), 0, memory.pixels, struct.pack("<I", memory.layers))
             rows, counts = self._host.film_arrays()
