@@ -43,6 +43,7 @@ def core_options(isas: str, python: str) -> List[str]:
     """CMake's -D options that decide what is compiled; python: the interpreter it is for."""
     options = [
         f"-DLUCH_ISAS={isas}",
+        "-DLUCH_WARNINGS_AS_ERRORS=ON",
         f"-DPython_EXECUTABLE={python}",
         f"-Dpybind11_DIR={output([str(VENV_PYTHON), '-m', 'pybind11', '--cmakedir'])}",
     ]

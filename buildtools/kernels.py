@@ -138,3 +138,5 @@ def place_kernels() -> None:
     AHEAD.mkdir()
     for (module, precision, architecture), name in zip(wanted, json.loads(names)):
         shutil.copyfile(FOLDER / f"{module}-{precision}-sm_{architecture}.cubin", AHEAD / name)
+    size = sum(path.stat().st_size for path in AHEAD.iterdir())
+    print(f"{len(wanted)} kernels, {size / 1e6:.0f} MB in {AHEAD}; the next package carries them")

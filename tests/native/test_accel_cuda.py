@@ -223,6 +223,26 @@ def test_gate_sees_instructions_that_a_precision_must_not_have(precision: str, l
     assert bool(faults(("BVH2", precision), f"\t{line}, %x;\n")) == wrong
 
 
+def test_kernels_compiled_ahead_of_time_are_taken_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Found under the name that `build.py build --cuda` gives them; another architecture's are not."""
+
+    def compiled(module: str, precision: str, architecture: int) -> bytes:
+        raise LookupError(f"{module} {precision} {architecture} would be compiled on first use")
+
+    mesh, rays = soup(20), random_rays(30)
+    with cuda_on_cpu.standing_in(tmp_path):
+        monkeypatch.setattr(compiler, "compiled", compiled)
+        ours = Accel(*mesh, kind="BVH2", device="CUDA")
+        folders = list(compiler.source_folders())
+        library = cuda_on_cpu.compile_module(compiler.source_of("BVH2"), "WATERTIGHT", tmp_path, folders)
+        (tmp_path / compiler.ahead_name("BVH2", "WATERTIGHT", 80)).write_text(library)
+        with pytest.raises(LookupError, match="BVH2 WATERTIGHT 90"):
+            ours.closest(rays)
+        (tmp_path / compiler.ahead_name("BVH2", "WATERTIGHT", 90)).write_text(library)
+        check_equal(ours.closest(rays), Accel(*mesh).closest(rays))
+        monkeypatch.undo()
+
+
 @pytest.mark.parametrize("precision", ["WATERTIGHT", "FAST"], ids="fibers-{}".format)
 def test_lanes_of_the_wide_tree_keep_out_of_each_others_shared_memory(tmp_path: Path, precision: Any) -> None:
     """With every thread's arrays apart the hits are the same: no thread reads what another wrote, none can race."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -47,6 +48,33 @@ def test_wheel_holds_every_module_of_the_core_and_no_foreign_one(extension_zip: 
     device |= {f"luch/cuda_source/{path.relative_to(native / 'cuda')}" for path in (native / "cuda").rglob("*.*")}
     ahead = {f"luch/{path.relative_to(native / 'luch')}" for path in (native / "luch").rglob("*.cubin")}
     assert {name for name in packed if name.startswith("luch/")} == sources | cores | device | ahead
+
+
+def test_wheel_alone_traces_rays_with_numpy_and_nothing_else(extension_zip: Path, tmp_path: Path) -> None:
+    """As after `pip install` into an empty environment: no Blender, no CuPy, no OpenImageIO."""
+    archive = zipfile.ZipFile(extension_zip)
+    wheel = archive.extract(next(name for name in archive.namelist() if name.endswith(".whl")), tmp_path)
+    site = tmp_path / "site"
+    zipfile.ZipFile(wheel).extractall(site)
+    numpy_home = Path(np.__file__).parents[1]
+    for name in ("numpy", "numpy.libs"):
+        if (numpy_home / name).exists():
+            (site / name).symlink_to(numpy_home / name)
+    program = (
+        "import json, sys, luch, numpy as np; "
+        "accel = luch.Accel(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32)); "
+        "t, prim, u, v = accel.closest(np.array([[0, 0, 0, 0, 1, 1, 1, 9]], np.float32)); "
+        "from luch.cuda import available, compiler; compiler.table(); "
+        "print(json.dumps([luch.__file__, float(t[0]), int(prim[0]), available(), "
+        "sorted({'bpy', 'cupy', 'OpenImageIO'} & set(sys.modules))]))"
+    )
+    command = [sys.executable, "-S", "-c", program]  # -S: none of this environment's own packages
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    told = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    file, t, prim, cuda, others = json.loads(told.stdout)
+    assert Path(file).is_relative_to(site)
+    assert (t, prim, cuda, others) == (pytest.approx(1 / 3), 0, False, [])
 
 
 def test_installed_from_the_zip_into_an_empty_user_folder_it_renders(extension_zip: Path, tmp_path: Path) -> None:
