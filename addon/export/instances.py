@@ -74,6 +74,10 @@ class InstanceCollector:
             self._context.warn(f'Object "{subject.name}" is a shadow catcher; Luch draws it as an ordinary object.')
         if subject.shadow_terminator_shading_offset > 0.0 and subject.type != "LIGHT":
             self._context.warn(f'Object "{subject.name}" has a Shading Offset, which Luch does not draw yet.')
+        if any(modifier.type == "SUBSURF" and modifier.use_adaptive_subdivision for modifier in subject.modifiers):
+            self._context.warn(
+                f'Object "{subject.name}" uses adaptive subdivision; Luch draws it at its modifier\'s render levels.'
+            )
         linking = subject.light_linking
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
             self._context.warn(

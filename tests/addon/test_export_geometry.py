@@ -257,3 +257,17 @@ def test_an_unsupported_object_is_named_once(scene: bpy.types.Scene) -> None:
 def test_name_hash_is_the_one_that_object_info_shows() -> None:
     # hash_uint2(hash_string("Cube"), 0) of Cycles 5.2, read off an Object Info > Random render.
     assert name_hash("Cube") / 0xFFFFFFFF == pytest.approx(0.31314194)
+
+
+def test_settings_of_an_object_that_change_nothing_yet_are_named(scene: bpy.types.Scene) -> None:
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    cube.name = "Stone"
+    cube.modifiers.new("Smooth", "SUBSURF").use_adaptive_subdivision = True
+    cube.shadow_terminator_shading_offset = 0.2
+    warnings = export().warnings
+    assert [word for word in ("adaptive subdivision", "Shading Offset") if any(word in text for text in warnings)] == [
+        "adaptive subdivision",
+        "Shading Offset",
+    ]
+    assert all('"Stone"' in text for text in warnings)

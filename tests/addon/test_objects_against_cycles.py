@@ -137,3 +137,16 @@ def test_an_object_scaled_to_nothing_is_drawn_flat(
     grid.data.materials.append(show(node, output))
     look_down(scene, 3.0)
     assert_same_picture(render, edge_share=0.02)
+
+
+def test_an_attribute_of_the_view_layer_may_be_the_worlds(scene: bpy.types.Scene, render: Render) -> None:
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (0.7, 0.2, 0.4)
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    material = show("ShaderNodeAttribute", "Color")
+    source = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeAttribute")
+    source.attribute_type, source.attribute_name = "VIEW_LAYER", "color"
+    bpy.ops.mesh.primitive_plane_add()
+    bpy.context.object.data.materials.append(material)
+    look_down(scene, 3.0)
+    assert_same_picture(render)

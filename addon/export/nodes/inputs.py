@@ -135,7 +135,9 @@ def attribute(c: Compiler, node: bpy.types.Node) -> Outputs:
     """Attribute of the geometry, the object, the instancer or the view layer."""
     b, kind, name = c.builder, node.attribute_type, node.attribute_name
     if kind == "VIEW_LAYER":
-        red, green, blue, alpha = property_color((c.context.view_layer, c.context.scene), name) or (0.0, 0.0, 0.0, 0.0)
+        scene = c.context.scene
+        owners = [owner for owner in (c.context.view_layer, scene, scene.world) if owner is not None]
+        red, green, blue, alpha = property_color(owners, name) or (0.0, 0.0, 0.0, 0.0)
         color = b.vector(red, green, blue)
         mean = b.constant((red + green + blue) / 3.0)
         return {"Color": color, "Vector": color, "Fac": mean, "Alpha": b.constant(alpha)}
