@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT / "native"), str(ROOT / "tests")]
 from luch.cuda.device import cupy, describe, kernel_seconds  # noqa: E402
 from luch.cuda.trace import BLOCK, SceneTracer  # noqa: E402
 from support.accel_meshes import icosphere, rows, soup  # noqa: E402
-from support.instances import ALL, NO_KINDS, Scene, placed  # noqa: E402
+from support.instances import ALL, NEVER, NO_KINDS, Scene, placed  # noqa: E402
 
 COMPARED = 1 << 16  # rays whose hits are compared with the CPU's
 SCENES = {  # instances, subdivisions of the sphere, triangles that may be copied
@@ -59,7 +59,10 @@ def rates(trees: Any, rays: Any, truth: Any, blocked: Any, options: argparse.Nam
         began = time.perf_counter()
         trees.closest(rays, NO_KINDS)
         return [{"kernel": "two_level.h", "mrays_per_s": len(rays) / (time.perf_counter() - began) / 1e6}]
-    tracer = SceneTracer(*trees.device_image(), "CWBVH", "WATERTIGHT", trees.is_one_group())
+    began, image, depth = time.perf_counter(), trees.device_image(), trees.stats()["depth"]
+    tracer = SceneTracer(*image, "CWBVH", "WATERTIGHT", trees.is_one_group(), trees.left_groups(), depth)
+    cupy().cuda.Device().synchronize()
+    print(f"  uploaded in {time.perf_counter() - began:.3f} s, groups built there: {len(trees.left_groups())}")
     one, found = "_one" if trees.is_one_group() else "", []
     for name in (f"trace_closest{one}", f"trace_any{one}", "trace_closest_simple", "trace_any_simple"):
         kernel, part = tracer.kernel(name), rays[:COMPARED]
@@ -86,12 +89,16 @@ def main() -> int:
     parser.add_argument("--rays", type=int, default=1 << 22)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--threads", type=int, default=0, help="of the builder; 0: all")
+    parser.add_argument("--leave-from", type=int, default=NEVER, help="triangles of a group that the GPU builds itself")
     parser.add_argument("--output", type=Path)
     options = parser.parse_args()
     record: dict[str, Any] = {"machine": describe() if options.device == "cuda" else {}, "rows": []}
     for name in options.scenes.split(","):
         scene, flatten = scene_of(name), SCENES[name][2]
-        trees, accel = scene.trees(flatten=flatten, threads=options.threads), scene.build(flatten=flatten)
+        trees, accel = (
+            scene.trees(flatten=flatten, threads=options.threads, leave_from=options.leave_from),
+            scene.build(flatten=flatten),
+        )
         stats = trees.stats()
         print(f"{name}: {stats['triangles']} triangles in {stats['groups']} groups, {stats['entries']} entries, "
               f"{stats['bytes'] / 1e6:.1f} MB, built in {stats['build_seconds']:.2f} s")  # fmt: skip

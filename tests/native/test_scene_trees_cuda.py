@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from luch.accel import STRUCTURES
-from luch.cuda.trace import SceneTracer
+from luch.cuda.trace import SceneTracer, TreesTooDeep
 from support import cuda_on_cpu
 from support.accel_meshes import icosphere, random_rays, rows, soup
 from support.instances import ALL, Scene, crowd
@@ -38,6 +38,11 @@ def check_equal(scene: Scene, rays: Any, kinds: Any, kind: str, flatten: int, pr
     oracle = scene.build("BVH", flatten, PRECISIONS.index(precision))
     trees = scene.trees(kind, flatten, PRECISIONS.index(precision))
     tracer = SceneTracer(*trees.device_image(), kind, precision, trees.is_one_group())
+    return compare(tracer, oracle, rays, kinds)
+
+
+def compare(tracer: SceneTracer, oracle: Any, rays: Any, kinds: Any) -> Any:
+    """The oracle's closest hits, which the device's equal."""
     truth = oracle.closest(rays, kinds)
     hits = tracer.closest_of(rays, kinds)
     for name, expected in zip(("t", "prim", "u", "v", "instance"), truth, strict=True):
@@ -94,6 +99,23 @@ def test_nothing_to_hit_and_no_rays_are_answered(place: str) -> None:
     rays, kinds = mixed_rays(place)
     assert (check_equal(empty, rays, kinds, "CWBVH", 0)[1] == -1).all()
     check_equal(crowd(9), rays[:0], kinds[:0], "CWBVH", 0)
+
+
+@pytest.mark.parametrize("flatten", [0, 10_000_000])
+def test_groups_that_the_device_builds_give_the_same_hits(place: str, flatten: int) -> None:
+    scene = hidden(crowd(12, spread=2.0)) if flatten == 0 else crowd(5, spread=2.0)
+    scene.meshes[0][0][5] = np.nan  # its triangles are left out
+    rays, kinds = mixed_rays(place)
+    trees = scene.trees(flatten=flatten, leave_from=4000)
+    left = trees.left_groups()
+    assert len(left) == (2 if flatten == 0 else 1)
+    assert trees.is_one_group() == (flatten > 0)
+    depth = trees.stats()["depth"]
+    tracer = SceneTracer(*trees.device_image(), "CWBVH", "WATERTIGHT", trees.is_one_group(), left, depth)
+    truth = scene.build(flatten=flatten)
+    compare(tracer, truth, rays, kinds)
+    with pytest.raises(TreesTooDeep):
+        SceneTracer(*trees.device_image(), "CWBVH", "WATERTIGHT", False, left, 96)
 
 
 def test_equal_hits_go_to_the_smaller_instance_on_the_device(place: str) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from support.accel_meshes import Mesh, icosphere, soup
 
 ALL = 63  # RayKind bits
+NEVER = 2**64 - 1
 NO_KINDS = np.zeros(0, np.uint32)
 
 # StructureKind of cpu/accel/structure.h; -1: the eight-wide tree
@@ -32,9 +33,13 @@ class Scene:
         """The CPU's two levels."""
         return core.ArrayAccel(*self._arrays(), _NUMBER[kind], 1, precision, 1, flatten, self._spheres())
 
-    def trees(self, kind: str = "CWBVH", flatten: int = 0, precision: int = 1, threads: int = 1) -> Any:
+    def trees(
+        self, kind: str = "CWBVH", flatten: int = 0, precision: int = 1, threads: int = 1, leave_from: int = NEVER
+    ) -> Any:
         """Those for devices."""
-        return core.ArraySceneTrees(*self._arrays(), _NUMBER[kind], 1, precision, threads, flatten, self._spheres())
+        return core.ArraySceneTrees(
+            *self._arrays(), _NUMBER[kind], 1, precision, threads, flatten, self._spheres(), leave_from
+        )
 
     def _spheres(self) -> NDArray[Any]:
         of_meshes = [self.spheres.get(m, np.zeros((0, 4))) for m in range(len(self.meshes))]

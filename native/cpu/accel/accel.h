@@ -28,6 +28,7 @@ struct AccelChoice {
     StructureKind kind = StructureKind::BRUTE_FORCE;  // unless wide
     BuildQuality quality = BuildQuality::NORMAL;
     Precision precision = Precision::WATERTIGHT;
+    u64 leave_from = ~u64(0);  // triangles of a group that SceneTrees leaves to a device's builder
 };
 
 // Instances that share a mesh are taken to the world, a copy of the triangles each, while all such copies

@@ -62,6 +62,7 @@ class Gather {
         *out = triangle_box(c.p[0], c.p[1], c.p[2]);
         return true;
     }
+    bool has_flags() const { return !flags_.empty(); }
     u32 flagged(u32 ref, const Member& member) const {
         if (flags_.empty() || flags_[member.mesh].empty()) return ref;
         u8 flag = flags_[member.mesh][member.prim_of(ref)];
@@ -167,6 +168,21 @@ void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gath
         fill(group.blocks);
 }
 
+void fill_flags(Group& group, const std::vector<u32>& refs, const Gather& gather, ThreadPool& pool) {
+    std::atomic<bool> any{false};
+    group.flags.assign(gather.ref_count(), 0);
+    pool.parallel_for(refs.size(), GATHER_CHUNK, [&](size_t begin, size_t end, unsigned) {
+        bool found = false;
+        for (size_t i = begin; i < end; ++i) {
+            if (gather.flagged(refs[i], group.member_of(refs[i])) == refs[i]) continue;
+            group.flags[refs[i]] = PRIMITIVE_MAY_BE_TRANSPARENT;
+            found = true;
+        }
+        if (found) any = true;
+    });
+    if (!any) group.flags = {};
+}
+
 // The primitives kept, side by side in order of ref: what builders take.
 StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, BuildQuality quality,
                        std::vector<u32>* refs_kept, ThreadPool& pool) {
@@ -189,11 +205,7 @@ StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Ga
             std::copy_n(&c.p[0].x, 9, group.corners.data() + 9 * size_t(ref));
         }
     });
-    for (u32 ref : refs) {
-        if (gather.flagged(ref, group.member_of(ref)) == ref) continue;
-        group.flags.resize(ref_count);
-        group.flags[ref] = PRIMITIVE_MAY_BE_TRANSPARENT;
-    }
+    if (gather.has_flags()) fill_flags(group, refs, gather, pool);
     u32 triangle_count = group.of_spheres ? 0 : ref_count;
     Primitives all = {group.corners.data(), group.spheres.data(), group.flags.empty() ? nullptr : group.flags.data(),
                       triangle_count, ref_count - triangle_count};
@@ -204,7 +216,8 @@ void make_structure(Group& group, const PrimBox* boxes, size_t kept, const Gathe
                     ThreadPool& pool) {
     std::vector<u32> refs;
     StructureInput input = collect(group, boxes, kept, gather, choice.quality, &refs, pool);
-    group.structure = build_structure(choice.kind, input, pool);
+    group.left = !group.of_spheres && kept >= choice.leave_from;
+    if (!group.left) group.structure = build_structure(choice.kind, input, pool);
 }
 
 // The wide tree by a binary builder of the quality asked for.

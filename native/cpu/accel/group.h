@@ -27,6 +27,7 @@ struct Group {
     std::vector<float> corners;   // of structure's triangles: nine floats a ref
     std::vector<float> spheres;   // of structure's spheres: four floats a ref
     std::vector<u8> flags;        // PrimitiveFlag by ref; empty: none
+    bool left = false;            // a device builds its structure from corners (zeros where dropped) and flags
     Box root;
     u64 kept = 0, dropped = 0;    // primitives
 

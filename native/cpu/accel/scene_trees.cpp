@@ -22,6 +22,7 @@ namespace {
 // Visiting an entry is a transform and a walk of its own: an entry a leaf.
 constexpr Collapse::Costs TOP_COSTS = {1.0f, 4.0f, 1};
 constexpr size_t SMALL_ARRAY = 1 << 16;  // bytes; smaller ones are uploaded together
+constexpr u32 GROUPS_BLOCK = 1;          // of an image, counted from the view's
 constexpr size_t ALIGNMENT = 256;        // of each in the common block
 
 // Arrays that are uploaded in one piece: a scene may have thousands of small groups.
@@ -100,6 +101,20 @@ class SceneTreesOf final : public SceneTrees {
         return root;
     }
 
+    std::vector<LeftGroup> left_groups() const override {
+        std::vector<LeftGroup> out;
+        for (u32 g = 0; g < groups_.size(); ++g) {
+            const Group& group = groups_[g];
+            if (!group.left) continue;
+            const u8* flags = group.flags.empty() ? nullptr : group.flags.data();
+            out.push_back({group.corners.data(), group.corners.size() / 9, flags, {}});
+            out.back().places.push_back({GROUPS_BLOCK, g * sizeof(Traced) + offsetof(Traced, structure)});
+            if (is_one_group() && g == only_group_)
+                out.back().places.push_back({0, offsetof(TwoLevelView<View>, only) + offsetof(Traced, structure)});
+        }
+        return out;
+    }
+
     bool is_one_group() const override { return view_.only_visibility != 0; }
     StructureKind kind() const override { return kind_; }
     SceneTreesStats stats() const override { return stats_; }
@@ -146,10 +161,10 @@ class SceneTreesOf final : public SceneTrees {
             for (const StructureArray& a : group.structure->arrays())
                 arrays_.push_back({a.name, g, offsetof(Traced, structure) + a.view_offset, a.data, a.bytes, 0});
         }
-        if (OWNS_PRIMITIVES<View>) {
+        if (OWNS_PRIMITIVES<View> && !group.left) {
             group.corners = group.spheres = {};
             group.flags = {};
-        } else {
+        } else if (!OWNS_PRIMITIVES<View>) {
             traced.primitives = {group.corners.data(), group.spheres.data(),
                                  group.flags.empty() ? nullptr : group.flags.data(), u32(group.corners.size() / 9),
                                  u32(group.spheres.size() / 4)};
@@ -204,6 +219,7 @@ std::unique_ptr<SceneTrees> SceneTrees::build(const SceneView& scene, const std:
     AccelChoice choice = asked;
     if (choice.wide) choice.kind = StructureKind::CWBVH;
     choice.wide = false;
+    if (choice.kind != StructureKind::CWBVH) choice.leave_from = ~u64(0);  // devices build no other
     auto make = [&]<class View>() -> std::unique_ptr<SceneTrees> {
         return std::make_unique<SceneTreesOf<View>>(scene, flags, pool, choice, flatten_triangles);
     };

@@ -23,6 +23,16 @@ class SceneTrees {
                                              u64 flatten_triangles = FLATTEN_TRIANGLES);
     virtual ~SceneTrees() = default;
 
+    // A group of many triangles whose tree a device builds itself (AccelChoice::leave_from).
+    struct LeftGroup {
+        const float* corners;  // nine floats a ref; zeros: not to be traced
+        size_t refs;
+        const u8* flags;  // PrimitiveFlag by ref; null: none
+        // Blocks of append's, counted from the view's, and where in them the structure's view belongs.
+        std::vector<std::pair<u32, size_t>> places;
+    };
+    virtual std::vector<LeftGroup> left_groups() const = 0;
+
     // Adds the view and everything behind it; returns the view's block: TwoLevelView<the structure>.
     // The image borrows from this object.
     virtual u32 append(DeviceImage& image) const = 0;
@@ -30,7 +40,7 @@ class SceneTrees {
     virtual bool is_one_group() const = 0;
     virtual StructureKind kind() const = 0;
 
-    // As Accel's, by the functions that devices run.
+    // As Accel's, by the functions that devices run. Groups that are left for the device are not there.
     virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const = 0;
     virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const = 0;
 

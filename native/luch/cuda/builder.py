@@ -61,13 +61,18 @@ def build_cwbvh(positions: Any, triangles: Any, flags: Any) -> tuple[bytes, list
     positions (V, 3) float32, triangles (T, 3) uint32, flags (T,) uint8 or empty. None where the CPU must build: few
     triangles, or a tree deeper than any walk may go.
     """
-    cp = cupy()
-    if len(triangles) < FEWEST:
+    return build_cwbvh_of(corners_of(positions, triangles), flags) if len(triangles) >= FEWEST else None
+
+
+def build_cwbvh_of(corners: Any, flags: Any) -> tuple[bytes, list[Any], dict[str, float]] | None:
+    """As build_cwbvh. corners: (T, 9) float32; triangles of no area are left out."""
+    cp, triangles = cupy(), len(corners)
+    if triangles < FEWEST:
         return None
     start, end = cp.cuda.Event(), cp.cuda.Event()
     start.record()
-    build = Build(corners_of(positions, triangles), cp.asarray(flags))
-    count = _sort(build, len(triangles))
+    build = Build(cp.asarray(corners), cp.asarray(flags))
+    count = _sort(build, triangles)
     if count < FEWEST:
         return None
     _merge(build, count)
@@ -80,8 +85,8 @@ def build_cwbvh(positions: Any, triangles: Any, flags: Any) -> tuple[bytes, list
     wide = build.arrays["wide"][: nodes * NODE_BYTES].copy()  # frees what was reserved for the worst tree
     stored = build.arrays["leaves"][: leaves * LEAF_BYTES].copy()
     view = struct.pack("<QQ6fII", wide.data.ptr, stored.data.ptr, *build.box, nodes, depth)
-    stats = {"primitives": count, "dropped": len(triangles) - count, "nodes": nodes, "references": leaves,
-             "depth": depth, "bytes": wide.nbytes + stored.nbytes, "primitive_bytes": 36 * len(triangles),
+    stats = {"primitives": count, "dropped": triangles - count, "nodes": nodes, "references": leaves,
+             "depth": depth, "bytes": wide.nbytes + stored.nbytes, "primitive_bytes": 36 * triangles,
              "build_seconds": cp.cuda.get_elapsed_time(start, end) / 1000}  # fmt: skip
     return view, [wide, stored], stats
 

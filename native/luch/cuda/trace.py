@@ -3,25 +3,57 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from luch.cuda.builder import MAX_DEPTH, build_cwbvh_of
 from luch.cuda.compiler import load
-from luch.cuda.device import Kernel, cupy
+from luch.cuda.device import DeviceError, Kernel, cupy
 from luch.cuda.upload import Blocks, DeviceCopy, Links
 
 BLOCK = 128  # RAY_BLOCK of rays/structure.cuh
 HIT = np.dtype([("t", "<f4"), ("prim", "<i4"), ("instance", "<i4"), ("u", "<f4"), ("v", "<f4")])  # luch::Hit; -1: NONE
 
 
+# Of a group that is left for the device: corners (T, 9) float32, flags, and (block, offset) where its view belongs.
+Left = Sequence[tuple[Any, Any, list[tuple[int, int]]]]
+
+
+class TreesTooDeep(DeviceError):
+    """What the device built is deeper than any walk may go: build all on the CPU."""
+
+
+def upload_trees(blocks: Blocks, links: Links, left: Left, depth: int) -> DeviceCopy:
+    """cpu::SceneTrees on the current device, the trees of `left` built there. depth: of those that are not left."""
+    whole, kept = list(blocks), []
+    for corners, flags, places in left:
+        made = build_cwbvh_of(corners, flags)
+        if made is None or made[2]["depth"] + depth >= MAX_DEPTH:
+            raise TreesTooDeep("The scene's trees are too deep for the GPU.")
+        view, arrays, _stats = made
+        kept += arrays
+        for block, offset in places:
+            name, data = whole[block]
+            patched = np.array(data, np.uint8)
+            patched[offset : offset + len(view)] = np.frombuffer(view, np.uint8)
+            whole[block] = name, patched
+    copy = DeviceCopy(whole, links)
+    copy.arrays += kept
+    return copy
+
+
 class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
-    def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, one_group: bool) -> None:
-        """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for."""
-        self._trees = DeviceCopy(blocks, links)
+    def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, one_group: bool, left: Left = (),
+                 depth: int = 0) -> None:  # fmt: skip
+        """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for.
+
+        left: groups that the device builds, if any; depth: of the trees that were built. May raise TreesTooDeep.
+        """
+        self._trees = upload_trees(blocks, links, left, depth)
         self._module = load(f"TRACE_{kind}", precision)
         one = "_one" if one_group and kind == "CWBVH" else ""
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
