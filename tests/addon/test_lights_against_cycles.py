@@ -174,3 +174,21 @@ def test_light_of_few_bounces_ends_as_in_cycles(
     assert_alike(ours, render("CYCLES", samples=128), mean=8e-3, tile=0.04)
     if kind == "lamp":  # paths that leave the scene still see the world
         assert ours[..., :3].mean() < (0.9995 if bounces else 0.99) * endless
+
+
+@pytest.mark.parametrize("limit", [1, 2, 8])
+def test_a_shadow_through_veils_ends_as_in_cycles(scene: bpy.types.Scene, render: Render, limit: int) -> None:
+    """Its count goes on from that of the path which it left, whatever becomes of the path."""
+    veil = bpy.data.materials.new("Veil")
+    shader = veil.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Alpha"].default_value, shader.inputs["Specular IOR Level"].default_value = 0.5, 0.0
+    for height in range(4):
+        bpy.ops.mesh.primitive_plane_add(size=40.0, location=(0.0, 0.0, height))
+        if height:
+            bpy.context.object.data.materials.append(veil)
+    bpy.ops.object.camera_add(location=(0.0, 0.0, 10.0))
+    scene.camera = bpy.context.object
+    add_lamp(scene, LAMPS["sun"])
+    scene.cycles.max_bounces, scene.cycles.transparent_max_bounces = 0, limit
+    ours, theirs = (render(engine, width=8, height=8, samples=256)[..., :3].mean() for engine in ("LUCH", "CYCLES"))
+    assert ours == pytest.approx(theirs, rel=0.01)

@@ -200,7 +200,7 @@ void Batch::trace_shadows() {
         if (shadow.casts) {
             if (blocked_[k] == BLOCKED_OPAQUE) continue;
             if (blocked_[k] == BLOCKED_MAYBE) {
-                through = walk_transparent(scene_, shadow_rays_[k], path, one, one, scratch_->light_points,
+                through = walk_transparent(scene_, shadow_rays_[k], shadow, one, one, scratch_->light_points,
                                            &counts_.transparent_steps, &counts_.shadow_rays);
             }
         }

@@ -13,7 +13,10 @@ struct ShadowRay {
     Color pass_diffuse, pass_glossy;
     u32 path;        // whose pixel and flags
     u32 lightgroup;
-    u32 bounce;      // of the path when the ray left
+    // Of the path when the ray left; by now it may have gone on.
+    u32 bounce;
+    u32 transparent_depth, depth;  // surfaces passed straight; depth_word
+    float footprint;
     bool for_ao;
     bool casts;      // false: the lamp casts no shadow, the ray counts as free
 };

@@ -118,6 +118,9 @@ LUCH_FN bool make_shadow_ray(const FilmLayout& layout, const PathState& path, u3
     }
     shadow->path = path_index;
     shadow->bounce = path.bounce;
+    shadow->transparent_depth = path.transparent_bounce;
+    shadow->depth = depth_word(path);
+    shadow->footprint = points.footprint[lane];
     shadow->lightgroup = s.lightgroup;
     shadow->for_ao = false;
     shadow->casts = s.cast_shadow;
@@ -136,6 +139,9 @@ LUCH_FN void make_ao_ray(const RenderView& scene, const PathState& path, u32 pat
     *shadow = ShadowRay{};
     shadow->contribution = path.throughput * (make_vec3(1.0f) - set.transparent);
     shadow->path = path_index;
+    shadow->transparent_depth = path.transparent_bounce;
+    shadow->depth = depth_word(path);
+    shadow->footprint = points.footprint[lane];
     shadow->for_ao = true;
     shadow->casts = true;
 }
@@ -148,11 +154,11 @@ LUCH_FN bool wants_ao(const FilmLayout& layout, const PathState& path) {
 // tracer.closest(ray) gives a Hit; shader.light(program, points, lane) a point's ClosureSet of light alone.
 // *steps: surfaces looked through; *rays: traced.
 template <class Tracer, class Shader>
-LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& shadow, const PathState& path, Tracer& tracer,
+LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const ShadowRay& shadow, Tracer& tracer,
                                Shader& shader, ShadePoints& points, u64* steps, u64* rays) {
     Color through = make_vec3(1.0f);
-    Ray ray = shadow;
-    for (u32 passed = path.transparent_bounce; passed <= scene.limits.transparent; passed++) {
+    Ray ray = first;
+    for (u32 passed = shadow.transparent_depth; passed <= scene.limits.transparent; passed++) {
         Hit hit = tracer.closest(ray);
         ++*rays;
         if (hit.instance == NONE) return through;
@@ -168,9 +174,9 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& shadow, const
         in.instance = hit.instance, in.prim = hit.prim;
         in.u = hit.u, in.v = hit.v;
         in.ray_length = hit.t;
-        in.footprint = path.footprint;
+        in.footprint = shadow.footprint;
         in.flags = PATH_SHADOW | PATH_TRANSPARENT_ONLY;
-        in.depth = depth_word(path);
+        in.depth = shadow.depth;
         in.transparent_depth = passed;
         in.path = 0, in.seed = 0;
         setup_surface_lane(scene.view, in, points, 0);
