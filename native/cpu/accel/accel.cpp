@@ -15,6 +15,8 @@ namespace {
 constexpr Hit MISS = {INFINITE_DISTANCE, NONE, NONE, 0.0f, 0.0f};
 constexpr u32 BATCH = 1024;  // rays looked at together
 
+u32 kinds_at(const u32* ray_kinds, size_t i) { return ray_kinds ? ray_kinds[i] : u32(RAY_ALL); }
+
 class TwoLevel final : public Accel {
  public:
     TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
@@ -33,9 +35,12 @@ class TwoLevel final : public Accel {
     template <class Count>
     u8 any_in_entry(const GroupEntry& entry, const Ray& ray, Count& count) const;
     template <class Count>
-    Hit closest_one(const Ray& ray, u32 kinds, Count& count) const;
+    void closest_one(const Ray& ray, u32 kinds, Hit* best, Count& count) const;
     Hit world_hit(const Group& group, const RefHit& hit) const;
-    void closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const;
+    const Group* only_group() const;
+    bool meets_only_group(const Ray& ray, u32 kinds) const;
+    void closest_scattered(const Group& group, const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const;
+    void closest_together(const Group& group, const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const;
     template <class Count>
     u8 any_one(const Ray& ray, u32 kinds, Count& count) const;
 
@@ -135,20 +140,21 @@ u8 TwoLevel::any_in_entry(const GroupEntry& entry, const Ray& ray, Count& count)
 }
 
 template <class Count>
-Hit TwoLevel::closest_one(const Ray& ray, u32 kinds, Count& count) const {
-    if (!ray_is_valid(ray)) return MISS;
-    Hit best = {min_f(ray.t_max, LARGEST_DISTANCE), NONE, NONE, 0.0f, 0.0f};
+void TwoLevel::closest_one(const Ray& ray, u32 kinds, Hit* best, Count& count) const {
+    *best = MISS;
+    if (!ray_is_valid(ray)) return;
+    best->t = min_f(ray.t_max, LARGEST_DISTANCE);
     auto visit = [&](u32 first, u32 size) {
         for (u32 e = first; e < first + size; ++e)
-            if (entries_[e].visibility & kinds) closest_in_entry(entries_[e], ray, &best, count);
+            if (entries_[e].visibility & kinds) closest_in_entry(entries_[e], ray, best, count);
     };
     auto visit_leaf = [&](u32 leaf) { visit(leaf_first(leaf), leaf_items(leaf)); };
     if (top_.size())
-        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), &best.t, visit_leaf,
+        visit_closest(top_.data(), top_ray(ray.origin, ray.direction, max_f(ray.t_min, 0.0f)), &best->t, visit_leaf,
                       count);
     else
         visit(0, u32(entries_.size()));
-    return best.prim == NONE ? MISS : best;
+    if (best->prim == NONE) best->t = INFINITE_DISTANCE;
 }
 
 template <class Count>
@@ -176,49 +182,71 @@ Hit TwoLevel::world_hit(const Group& group, const RefHit& hit) const {
     return {hit.t, member.prim_of(hit.ref), member.instance, hit.u, hit.v};
 }
 
-// All is one group in the world: its rays can be interleaved.
-void TwoLevel::closest_scattered(const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const {
-    const Group& group = groups_[entries_[0].group];
+// All that there is, where it is one group in the world: its rays need no entries, which cost 4 ns each, and may be
+// interleaved.
+const Group* TwoLevel::only_group() const {
+    return entries_.size() == 1 && entries_[0].instance == NONE ? &groups_[entries_[0].group] : nullptr;
+}
+bool TwoLevel::meets_only_group(const Ray& ray, u32 kinds) const {
+    return (kinds & entries_[0].visibility) && ray_is_valid(ray);
+}
+
+void TwoLevel::closest_scattered(const Group& group, const Ray* rays, const u32* ray_kinds, Hit* hits,
+                                 u32 count) const {
     RefHit found[BATCH];
     u32 valid[BATCH] = {}, valid_count = 0;
     for (u32 i = 0; i < count; ++i) {
         found[i] = {min_f(rays[i].t_max, LARGEST_DISTANCE), NONE, 0.0f, 0.0f};
-        bool sees = !ray_kinds || (ray_kinds[i] & entries_[0].visibility);
-        if (sees && ray_is_valid(rays[i])) valid[valid_count++] = i;
+        if (meets_only_group(rays[i], kinds_at(ray_kinds, i))) valid[valid_count++] = i;
     }
     closest_interleaved(group, rays, valid, valid_count, found);
     for (u32 i = 0; i < count; ++i) hits[i] = world_hit(group, found[i]);
 }
 
-void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count, Counters* counters) const {
-    auto kinds_of = [&](size_t i) { return ray_kinds ? ray_kinds[i] : u32(RAY_ALL); };
-    if (counters) {
-        for (size_t i = 0; i < count; ++i) hits[i] = closest_one(rays[i], kinds_of(i), *counters);
-        return;
-    }
+void TwoLevel::closest_together(const Group& group, const Ray* rays, const u32* ray_kinds, Hit* hits, u32 count) const {
     NoCounters none;
-    const Group* one = entries_.size() == 1 && entries_[0].instance == NONE ? &groups_[entries_[0].group] : nullptr;
+    for (u32 i = 0; i < count; ++i) {
+        RefHit found = {min_f(rays[i].t_max, LARGEST_DISTANCE), NONE, 0.0f, 0.0f};
+        if (meets_only_group(rays[i], kinds_at(ray_kinds, i)))
+            closest_in_group(group, lane_ray(rays[i]), max_f(rays[i].t_min, 0.0f), &found, none);
+        hits[i] = world_hit(group, found);
+    }
+}
+
+void TwoLevel::closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count, Counters* counters) const {
+    auto by_entries = [&](auto& kept) {
+        for (size_t i = 0; i < count; ++i) closest_one(rays[i], kinds_at(ray_kinds, i), hits + i, kept);
+    };
+    NoCounters none;
+    const Group* only = only_group();
+    if (counters) return by_entries(*counters);
+    if (!only) return by_entries(none);
     for (size_t first = 0; first < count; first += BATCH) {
         u32 size = u32(std::min<size_t>(BATCH, count - first));
         const u32* kinds = ray_kinds ? ray_kinds + first : nullptr;
-        if (one && one->nodes.size() && one->precision == Precision::WATERTIGHT &&
-            rays_are_scattered(rays + first, size, one->root)) {
-            closest_scattered(rays + first, kinds, hits + first, size);
-            continue;
-        }
-        for (size_t i = first; i < first + size; ++i) hits[i] = closest_one(rays[i], kinds_of(i), none);
+        bool interleave = only->nodes.size() && only->precision == Precision::WATERTIGHT &&
+                          rays_are_scattered(rays + first, size, only->root);
+        if (interleave)
+            closest_scattered(*only, rays + first, kinds, hits + first, size);
+        else
+            closest_together(*only, rays + first, kinds, hits + first, size);
     }
 }
 
 void TwoLevel::any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count, Counters* counters) const {
-    auto each = [&](auto& kept) {
-        for (size_t i = 0; i < count; ++i) blocked[i] = any_one(rays[i], ray_kinds ? ray_kinds[i] : u32(RAY_ALL), kept);
+    auto by_entries = [&](auto& kept) {
+        for (size_t i = 0; i < count; ++i) blocked[i] = any_one(rays[i], kinds_at(ray_kinds, i), kept);
     };
     NoCounters none;
-    if (counters)
-        each(*counters);
-    else
-        each(none);
+    const Group* only = only_group();
+    if (counters) return by_entries(*counters);
+    if (!only) return by_entries(none);
+    for (size_t i = 0; i < count; ++i) {
+        blocked[i] = BLOCKED_NOT;
+        if (meets_only_group(rays[i], kinds_at(ray_kinds, i)))
+            blocked[i] = any_in_group(*only, lane_ray(rays[i]), max_f(rays[i].t_min, 0.0f),
+                                      min_f(rays[i].t_max, LARGEST_DISTANCE), none);
+    }
 }
 
 }  // namespace
