@@ -225,6 +225,7 @@ class Settings:
     precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
     integrator: str = "PATH"
     device: str = "CPU"  # or "CUDA"
+    compile_only_needed: bool = True  # CUDA: kernels hold no code for what the scene lacks; False: all, to compare
     estimate_error: bool = True  # two independent sequences a pixel, whose difference tells the picture's error
     ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
 

@@ -131,3 +131,29 @@ def test_every_pass_is_the_cpus(place: str) -> None:
 def test_the_error_is_the_cpus(place: str) -> None:
     _, cpu, _, ours = both(everything())
     assert ours["error"] == pytest.approx(cpu["error"], rel=1e-4 if place == FIBERS else 0.05)
+
+
+def plain() -> Scene:
+    """A floor under one lamp: nothing else."""
+    scene = everything(max_bounces=2)
+    instances = scene.instances
+    assert instances is not None
+    one = Instances(*(getattr(instances, name)[:1] for name in ("object", "matrix", "random", "generated", "uv")))
+    return replace(scene, meshes=scene.meshes[:1], objects=scene.objects[:1], instances=one, lights=scene.lights[:1],
+                   materials=[Material("Chalk", program(chalk))], world=None)  # fmt: skip
+
+
+def chalk(builder: ProgramBuilder) -> None:
+    closure(builder, "CLOSURE_DIFFUSE", {"color": (0.6, 0.5, 0.4)})
+
+
+def test_code_for_what_the_scene_lacks_changes_no_bit(place: str) -> None:
+    scene = plain()
+    everything_compiled = replace(scene, settings=replace(scene.settings, device="CUDA", compile_only_needed=False))
+    full = render(everything_compiled)
+    lean = render(replace(scene, settings=replace(scene.settings, device="CUDA")))
+    assert np.array_equal(full.passes["Combined"], lean.passes["Combined"])
+    assert lean.passes["Combined"][..., :3].max() > 0.1
+    absent = {name for name, needed in lean.stats["kernel_plan"].items() if not needed}
+    assert absent >= {"THIN_FILM", "MICROFACETS", "SUNS", "EMISSIVE_MESHES", "WORLD_SAMPLING", "LIGHT_PASSES", "SHEEN"}
+    assert lean.stats["kernel_plan"]["LAMPS"]

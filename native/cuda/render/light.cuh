@@ -9,7 +9,8 @@ LUCH_STAGE(find_light) {
     u32 k = stage_index();
     if (k >= wave.counters[WAVE_RAYS]) return;
     bool missed = wave.hits[k].instance == NONE;
-    if (!missed && !task.scene.has_visible_lamps) return;
+    bool lamps = plan::LAMPS && task.scene.has_visible_lamps;
+    if (!missed && !lamps) return;
     u32 slot = wave.ray_slot[k];
     PathState path = load_path(wave, slot);
     Ray ray = wave.rays[k];
@@ -17,7 +18,7 @@ LUCH_STAGE(find_light) {
     ShadePoints points;
     ClosureSet set;
     PointShader shader{task.scene.view, set};
-    if (task.scene.has_visible_lamps) find_lamps(task.scene, writer, path, ray, wave.hits[k].t, shader, points);
+    if (lamps) find_lamps(task.scene, writer, path, ray, wave.hits[k].t, shader, points);
     if (missed && leave_scene(task.scene, writer, path, ray, shader, points)) {
         Color radiance = task.scene.world_emission.radiance;
         if (!task.scene.world_emission.constant) {

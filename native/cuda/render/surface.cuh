@@ -25,9 +25,9 @@ __device__ __forceinline__ void push_shadow(const Wavefront& wave, const Ray& ra
     wave.shadows[at] = shadow;
 }
 
-__device__ __forceinline__ void light_surface(const RenderTask& task, const PathState& path, u32 slot,
-                                              const ShadePoints& points, const ClosureSet& set,
-                                              const SurfacePoint& spawn) {
+__device__ __noinline__ void light_surface(const RenderTask& task, const PathState& path, u32 slot,
+                                           const ShadePoints& points, const ClosureSet& set,
+                                           const SurfacePoint& spawn) {
     LightSample sample;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_LIGHT);
     if (!choose_light(task.scene, path, points, 0, set, u, &sample)) return;
@@ -36,6 +36,20 @@ __device__ __forceinline__ void light_surface(const RenderTask& task, const Path
     ShadowRay shadow;
     if (make_shadow_ray(task.film.layout, path, slot, points, 0, set, spawn, sample, emission, &ray, &shadow))
         push_shadow(task.wave, ray, shadow);
+}
+
+// The path's next ray, if it goes on.
+__device__ __noinline__ void send_on(const RenderTask& task, FilmWriter& writer, PathState& path, u32 slot,
+                                     const ShadePoints& points, const ClosureSet& set, const SurfacePoint& spawn,
+                                     Vec3 direction, float distance) {
+    const Wavefront& wave = task.wave;
+    Ray next;
+    Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
+    if (!scatter(task.scene, writer, path, points, 0, set, spawn, u, direction, distance, &next)) return;
+    u32 at = append(wave, WAVE_NEXT_RAYS);
+    wave.next_rays[at] = next;
+    wave.next_slot[at] = slot;
+    wave.next_kind[at] = path.visibility;
 }
 
 // entry: of the sorted queue. True when the surface was shaded.
@@ -67,14 +81,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
             make_ao_ray(scene, path, slot, points, 0, set, spawn, &ao_ray, &ao);
             push_shadow(wave, ao_ray, ao);
         }
-        Ray next;
-        Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
-        if (scatter(scene, writer, path, points, 0, set, spawn, u, ray.direction, hit.t, &next)) {
-            u32 at = append(wave, WAVE_NEXT_RAYS);
-            wave.next_rays[at] = next;
-            wave.next_slot[at] = slot;
-            wave.next_kind[at] = path.visibility;
-        }
+        send_on(task, writer, path, slot, points, set, spawn, ray.direction, hit.t);
         store_path(wave, slot, path);
     }
     add_total(wave, TOTAL_REJECTED, writer.rejected);

@@ -8,12 +8,14 @@
 #define LUCH_FN_SLOW __host__ __device__ __noinline__
 #define LUCH_FN_APART __host__ __device__ __noinline__
 #define LUCH_CONST __device__ constexpr
+#define LUCH_KEEP_LOOP _Pragma("unroll 1")  // long bodies: compiling them many times takes longer than running them
 #else
 #define LUCH_CUDA 0
 #define LUCH_FN inline __attribute__((always_inline))
 #define LUCH_FN_SLOW inline
 #define LUCH_FN_APART inline __attribute__((noinline))  // a loop over lanes, vectorised on its own
 #define LUCH_CONST inline constexpr
+#define LUCH_KEEP_LOOP
 #endif
 
 #if defined(__CUDACC_RTC__)  // knows CUDA's functions, not the builtins that nvcc takes from the C++ compiler

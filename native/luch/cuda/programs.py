@@ -79,6 +79,15 @@ def _body(program: Linked, count: int, instructions: Any, operands: Any) -> str:
     return "\n".join([line for line in lines if line] + statements)
 
 
+def operations(programs: list[Linked], instructions: Any) -> set[str]:
+    """Names of all that the programs hold."""
+    codes: set[int] = set()
+    for program in programs:
+        own = instructions[program.first_instruction : program.first_instruction + program.instruction_count]
+        codes.update(own["op"].tolist())
+    return {BY_CODE[code].name for code in codes}
+
+
 def source(programs: list[Linked], instructions: Any, operands: Any) -> str:
     """luch_scene_programs.cuh: run_program and run_light_program over exactly these programs.
 

@@ -150,7 +150,7 @@ class DeviceRenderer:
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], precision, facts["one_group"])
         self._upload_seconds = time.perf_counter() - began
         self._paths = load("RENDER_PATHS", precision)
-        self._stages = SceneKernels(facts, blocks, precision)
+        self._stages = SceneKernels(facts, blocks, self._scene)
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
         self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]))
@@ -282,6 +282,7 @@ class DeviceRenderer:
             device_film_and_paths_bytes=self._memory.bytes,
             paths_at_once=self._memory.slots,
             path_bytes=core.render.task_sizes()["path"],
+            kernel_plan=self._stages.plan,
             kernels="general" if self._stages.general else "the scene's own",
             kernel_compile_seconds=self._stages.compile_seconds,
         )

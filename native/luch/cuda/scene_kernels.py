@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from luch.cuda import compiler
+from luch.cuda import plan as plans
 from luch.cuda.device import DeviceError, Kernel, Module, architecture_of, cupy
-from luch.cuda.programs import INSTRUCTION, Linked, source
+from luch.cuda.programs import INSTRUCTION, Linked, operations, source
+from luch.effects import effects_of
+from luch.scene import Scene
 
 STAGES = "RENDER_STAGES"
 # Registers of the interpreter of the general kernels (native/cuda/render/interpreter.cuh).
@@ -21,8 +24,9 @@ INTERPRETER_REGISTERS = 256
 class SceneKernels:
     """``kernel(name)`` is the best that is there at the moment; asked anew at every wave."""
 
-    def __init__(self, facts: dict[str, Any], blocks: list[tuple[str, Any]], precision: str) -> None:
+    def __init__(self, facts: dict[str, Any], blocks: list[tuple[str, Any]], scene: Scene) -> None:
         """facts, blocks: core.render.Renderer.device_facts and its RenderTask's blocks."""
+        precision = scene.settings.precision
         arrays = dict(blocks)
         programs = [Linked(*row) for row in facts["programs"]]
         instructions = np.frombuffer(arrays["instructions"], INSTRUCTION)
@@ -33,6 +37,9 @@ class SceneKernels:
             f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
             f"-DLUCH_STRUCTURE={structure}",
         ]
+        self.plan = plans.plan_of(effects_of(scene), operations(programs, instructions))
+        if scene.settings.compile_only_needed:
+            self._flags += plans.flags(self.plan)
         self._precision = precision
         self._module: Module | None = None
         self._ready: bytes | None = None

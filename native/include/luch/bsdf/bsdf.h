@@ -6,6 +6,7 @@
 #include "luch/bsdf/microfacet.h"
 #include "luch/bsdf/sheen.h"
 #include "luch/bsdf/toon.h"
+#include "luch/plan.h"
 
 namespace luch {
 
@@ -45,18 +46,23 @@ LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
         case LobeType::TRANSLUCENT:
             return eval_translucent(lobe, wi);
         case LobeType::SHEEN:
-            return eval_sheen(lobe, wi);
+            if constexpr (plan::SHEEN) return eval_sheen(lobe, wi);
+            break;
         case LobeType::ASHIKHMIN_SHEEN:
-            return eval_velvet(lobe, wo, wi);
+            if constexpr (plan::SHEEN) return eval_velvet(lobe, wo, wi);
+            break;
         case LobeType::TOON_DIFFUSE:
         case LobeType::TOON_GLOSSY:
-            return eval_toon(lobe, wo, wi);
+            if constexpr (plan::TOON) return eval_toon(lobe, wo, wi);
+            break;
         case LobeType::ASHIKHMIN_SHIRLEY:
-            return eval_ashikhmin_shirley(lobe, wo, wi);
+            if constexpr (plan::ASHIKHMIN_SHIRLEY) return eval_ashikhmin_shirley(lobe, wo, wi);
+            break;
         case LobeType::MICROFACET_REFLECTION:
         case LobeType::MICROFACET_REFRACTION:
         case LobeType::MICROFACET_GLASS:
-            return eval_microfacet(lobe, wo, wi);
+            if constexpr (plan::MICROFACETS) return eval_microfacet(lobe, wo, wi);
+            break;
         case LobeType::NONE_:
             break;
     }
@@ -96,11 +102,11 @@ LUCH_FN_SLOW BsdfValue eval_closures(const ClosureSet& set, Vec3 /*n_geometric*/
 LUCH_FN LobeSample sample_fibres_or_diffuse(const Lobe& lobe, Vec3 n_outside, Vec3 wo, Vec2 u) {
     LobeSample s = {};
     s.transmitted = lobe.type == LobeType::TRANSLUCENT;
-    if (lobe.type == LobeType::SHEEN) {
+    if (plan::SHEEN && lobe.type == LobeType::SHEEN) {
         s.direction = sample_sheen(lobe, u);
-    } else if (lobe.type == LobeType::ASHIKHMIN_SHEEN) {
+    } else if (plan::SHEEN && lobe.type == LobeType::ASHIKHMIN_SHEEN) {
         s.direction = sample_uniform_around(lobe.normal, u);
-    } else if (lobe.type == LobeType::TOON_DIFFUSE || lobe.type == LobeType::TOON_GLOSSY) {
+    } else if (plan::TOON && (lobe.type == LobeType::TOON_DIFFUSE || lobe.type == LobeType::TOON_GLOSSY)) {
         s.direction = sample_toon(lobe, wo, u);
     } else {
         s.direction = sample_cosine_around(s.transmitted ? -lobe.normal : lobe.normal, u);
@@ -118,9 +124,10 @@ LUCH_FN LobeSample sample_lobe(const Lobe& lobe, Vec3 n_geometric, Vec3 wo, floa
     Vec3 outside = mirrored ? -n_geometric : n_geometric;
     Vec3 seen_from = mirrored ? mirrored_at(wo, lobe.normal) : wo;
     LobeSample s;
-    if (lobe.type >= LobeType::MICROFACET_REFLECTION) {
-        s = lobe.type == LobeType::ASHIKHMIN_SHIRLEY ? sample_ashikhmin_shirley(lobe, outside, seen_from, u)
-                                                     : sample_microfacet(lobe, outside, seen_from, u_side, u);
+    if (plan::ASHIKHMIN_SHIRLEY && lobe.type == LobeType::ASHIKHMIN_SHIRLEY) {
+        s = sample_ashikhmin_shirley(lobe, outside, seen_from, u);
+    } else if (plan::MICROFACETS && lobe.type >= LobeType::MICROFACET_REFLECTION) {
+        s = sample_microfacet(lobe, outside, seen_from, u_side, u);
     } else {
         s = sample_fibres_or_diffuse(lobe, outside, seen_from, u);
     }

@@ -9,6 +9,7 @@
 #pragma once
 #include "luch/bsdf/albedo.h"
 #include "luch/bsdf/thin_film.h"
+#include "luch/plan.h"
 
 namespace luch {
 
@@ -21,7 +22,7 @@ LUCH_FN bool can_reflect(const Lobe& l) { return l.type != LobeType::MICROFACET_
 LUCH_FN bool can_transmit(const Lobe& l) {
     return l.type == LobeType::MICROFACET_REFRACTION || l.type == LobeType::MICROFACET_GLASS;
 }
-LUCH_FN bool has_film(const Lobe& l) { return l.thin_film_thickness > FILM_MIN_THICKNESS_NM; }
+LUCH_FN bool has_film(const Lobe& l) { return plan::THIN_FILM && l.thin_film_thickness > FILM_MIN_THICKNESS_NM; }
 
 // The film's colour is scaled towards the wanted F0 where it is near the real one.
 LUCH_FN float scale_film_f0(float f, float f0, float real_f0) {

@@ -31,7 +31,8 @@ LUCH_FN bool admit(const RenderView& scene, FilmWriter& writer, Color& c, u32 bo
     return true;
 }
 
-LUCH_FN void add_to_light_passes(FilmWriter& writer, u32 pixel, Color c, Color diffuse, Color glossy, bool direct) {
+LUCH_FN_SLOW void add_to_light_passes(FilmWriter& writer, u32 pixel, Color c, Color diffuse, Color glossy,
+                                      bool direct) {
     const FilmLayout& layout = writer.film.layout;
     Color rest = make_vec3(1.0f) - diffuse - glossy;
     film_add(writer, pixel, direct ? layout.diffuse_direct : layout.diffuse_indirect, c * diffuse);
@@ -47,9 +48,9 @@ LUCH_FN void add_emission(const RenderView& scene, FilmWriter& writer, const Pat
     if (is_zero(c) || !admit(scene, writer, c, path.bounce > 1 ? 1 : 0)) return;
     film_add_combined(writer, path.pixel, path.flags & PATH_OTHER_HALF, c);
     const FilmLayout& layout = writer.film.layout;
-    if (!layout.any_light_pass && !(path.flags & PATH_FEATURES)) return;
+    if (!wants_light_passes(layout) && !gathers_features(path)) return;
     if (lightgroup) film_add_lightgroup(writer, path.pixel, lightgroup - 1, c);
-    if (path.flags & PATH_FEATURES) {
+    if (gathers_features(path)) {
         film_add(writer, path.pixel, layout.denoising_albedo, path.feature_throughput * c);
     }
     if (!(path.flags & PATH_PASS_CHOSEN)) {
@@ -69,12 +70,12 @@ LUCH_FN void add_direct(const RenderView& scene, FilmWriter& writer, const PathS
                         Color transmittance) {
     Color c = shadow.contribution * transmittance;
     if (!admit(scene, writer, c, shadow.bounce)) return;
-    if (shadow.for_ao) {
+    if (plan::AMBIENT_OCCLUSION && shadow.for_ao) {
         film_add(writer, path.pixel, writer.film.layout.ambient_occlusion, c);
         return;
     }
     film_add_combined(writer, path.pixel, path.flags & PATH_OTHER_HALF, c);
-    if (!writer.film.layout.any_light_pass) return;
+    if (!wants_light_passes(writer.film.layout)) return;
     if (shadow.lightgroup) film_add_lightgroup(writer, path.pixel, shadow.lightgroup - 1, c);
     add_to_light_passes(writer, path.pixel, c, shadow.pass_diffuse, shadow.pass_glossy, shadow.bounce == 0);
 }
@@ -116,8 +117,8 @@ LUCH_FN void write_crypto(const RenderView& scene, FilmWriter& writer, const Pat
     film_add_crypto(writer, path.pixel, layout.crypto_asset, object.crypto_asset, weight);
 }
 
-LUCH_FN void write_data_passes(const RenderView& scene, FilmWriter& writer, PathState& path, const ShadePoints& points,
-                               int lane, const ClosureSet& set, u32 material) {
+LUCH_FN_SLOW void write_data_passes(const RenderView& scene, FilmWriter& writer, PathState& path,
+                                    const ShadePoints& points, int lane, const ClosureSet& set, u32 material) {
     if (!(path.flags & PATH_THROUGH_FILM)) return;
     const FilmLayout& layout = writer.film.layout;
     float alpha = 1.0f - average(set.transparent);
@@ -151,8 +152,8 @@ LUCH_FN float smooth_step_between(float from, float to, float x) {
 
 // Albedo and normal (in camera space) for a denoiser; transparency and sharp reflections pass the task on
 // to what they show.
-LUCH_FN void write_features(const RenderView& scene, FilmWriter& writer, PathState& path, const ClosureSet& set,
-                            Vec3 to_viewer) {
+LUCH_FN_SLOW void write_features(const RenderView& scene, FilmWriter& writer, PathState& path, const ClosureSet& set,
+                                 Vec3 to_viewer) {
     Vec3 normal = make_vec3(0.0f);
     Color rough_albedo = make_vec3(0.0f), sharp_albedo = make_vec3(0.0f);
     float sum = 0.0f, rough_sum = 0.0f;

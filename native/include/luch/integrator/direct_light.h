@@ -112,7 +112,7 @@ LUCH_FN bool make_shadow_ray(const FilmLayout& layout, const PathState& path, u3
     shadow->contribution = path.throughput * reflected * light * weight;
     shadow->pass_diffuse = path.pass_diffuse;
     shadow->pass_glossy = path.pass_glossy;
-    if (layout.any_light_pass && !(path.flags & PATH_PASS_CHOSEN)) {
+    if (wants_light_passes(layout) && !(path.flags & PATH_PASS_CHOSEN)) {
         shadow->pass_diffuse = share(value.diffuse, reflected);
         shadow->pass_glossy = share(value.glossy, reflected);
     }
@@ -147,7 +147,7 @@ LUCH_FN void make_ao_ray(const RenderView& scene, const PathState& path, u32 pat
 }
 
 LUCH_FN bool wants_ao(const FilmLayout& layout, const PathState& path) {
-    return layout.ambient_occlusion != NONE && (path.flags & PATH_CAMERA);
+    return plan::AMBIENT_OCCLUSION && layout.ambient_occlusion != NONE && (path.flags & PATH_CAMERA);
 }
 
 // A shadow ray that met only surfaces that may be transparent: from one to the next, until it is dark.

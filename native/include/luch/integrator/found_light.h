@@ -61,7 +61,7 @@ template <class Shader>
 LUCH_FN bool leave_scene(const RenderView& scene, FilmWriter& writer, const PathState& path, const Ray& ray,
                          Shader& shader, ShadePoints& points) {
     // Suns with an angle.
-    for (u32 sun = 0; sun < scene.view.lights->sun_count; sun++) {
+    for (u32 sun = 0; plan::SUNS && sun < scene.view.lights->sun_count; sun++) {
         LampHit hit = sun_hit(scene.view, sun, ray.direction, path.visibility);
         if (hit.lamp != NONE) add_lamp(scene, writer, path, hit, ray, shader, points);
     }

@@ -4,6 +4,7 @@
 #include "luch/bsdf/closure.h"
 #include "luch/geometry/ray.h"
 #include "luch/math/fn.h"
+#include "luch/plan.h"
 #include "luch/sampling/sampler.h"
 #include "luch/shade/point.h"
 
@@ -134,7 +135,7 @@ LUCH_FN Color share(Color part, Color whole) {
 // Scales a contribution whose brightness passes the limit; biased, off at 0.
 LUCH_FN Color clamp_contribution(Color c, float limit) {
     float sum = abs_f(c.x) + abs_f(c.y) + abs_f(c.z);
-    return (limit > 0.0f && sum > limit) ? c * (limit / sum) : c;
+    return (plan::CLAMPING && limit > 0.0f && sum > limit) ? c * (limit / sum) : c;
 }
 
 }  // namespace luch

@@ -36,8 +36,12 @@ struct RenderView {
 
 // Paths take notes for a denoiser until they meet something rough.
 LUCH_FN bool wants_features(const FilmLayout& layout) {
-    return layout.denoising_albedo != NONE || layout.denoising_normal != NONE;
+    return plan::DENOISING_PASSES && (layout.denoising_albedo != NONE || layout.denoising_normal != NONE);
 }
+
+LUCH_FN bool wants_light_passes(const FilmLayout& layout) { return plan::LIGHT_PASSES && layout.any_light_pass; }
+LUCH_FN bool wants_data_passes(const FilmLayout& layout) { return plan::DATA_PASSES && layout.any_data_pass; }
+LUCH_FN bool gathers_features(const PathState& path) { return plan::DENOISING_PASSES && (path.flags & PATH_FEATURES); }
 
 // Bounces as Light Path's nodes read them from ShadePoints::depth.
 LUCH_FN u32 depth_word(const PathState& path) {

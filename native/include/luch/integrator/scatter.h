@@ -41,7 +41,7 @@ LUCH_FN LaneInputs surface_inputs(const PathState& path, u32 path_index, const H
 
 // Filter Glossy: after improbable bounces sharp lobes are blurred.
 LUCH_FN void soften(const PathLimits& limits, const PathState& path, ClosureSet& set) {
-    if (!(limits.filter_glossy > 0.0f)) return;
+    if (!plan::FILTER_GLOSSY || !(limits.filter_glossy > 0.0f)) return;
     // Blender's knob is a roughness; its inverse bounds the density that stays sharp.
     float blur_pdf = path.min_pdf / limits.filter_glossy;
     if (blur_pdf < 1.0f) blur_closures(set, sqrt_f(1.0f - blur_pdf) * 0.5f);
@@ -50,7 +50,8 @@ LUCH_FN void soften(const PathLimits& limits, const PathState& path, ClosureSet&
 // True when nothing is left of the path.
 LUCH_FN bool apply_holdout(const RenderView& scene, FilmWriter& writer, PathState& path, u32 instance,
                            ClosureSet& set) {
-    bool whole = scene.view.instances[instance].flags & INSTANCE_HOLDOUT;
+    bool whole = plan::HOLDOUT && (scene.view.instances[instance].flags & INSTANCE_HOLDOUT);
+    if (!plan::HOLDOUT) return false;
     if ((!whole && !(set.holdout > 0.0f)) || !(path.flags & PATH_THROUGH_FILM)) return false;
     float weight = whole ? 1.0f - average(set.transparent) : set.holdout;
     add_alpha_hole(writer, path, average(path.throughput) * weight);
@@ -66,7 +67,7 @@ LUCH_FN void add_surface_emission(const RenderView& scene, FilmWriter& writer, c
                                   const ShadePoints& points, int lane, Color emission) {
     float pdf = 0.0f;
     u32 instance = points.instance[lane];
-    if (!(path.flags & PATH_NO_MIS)) {
+    if (plan::EMISSIVE_MESHES && !(path.flags & PATH_NO_MIS)) {
         pdf = pdf_triangle(scene.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, instance,
                            points.prim[lane], -lane_to_viewer(points, lane), points.ray_length[lane]);
     }
@@ -84,8 +85,8 @@ LUCH_FN bool meet_surface(const RenderView& scene, FilmWriter& writer, PathState
     if (path.flags & PATH_ENDS_AT_SURFACE) return false;
     if (path.continuation != 1.0f) path.throughput *= 1.0f / path.continuation;
     if (aovs) write_aovs(writer, path, aovs);
-    if (writer.film.layout.any_data_pass) write_data_passes(scene, writer, path, points, lane, set, material);
-    if (path.flags & PATH_FEATURES) write_features(scene, writer, path, set, lane_to_viewer(points, lane));
+    if (wants_data_passes(writer.film.layout)) write_data_passes(scene, writer, path, points, lane, set, material);
+    if (gathers_features(path)) write_features(scene, writer, path, set, lane_to_viewer(points, lane));
     if (path.flags & PATH_LAST_BOUNCE) set.count = 0;  // only straight-through light goes on
     return true;
 }
@@ -103,7 +104,7 @@ LUCH_FN bool set_transmits(const ClosureSet& set) {
 
 // The first bounce decides how its later light is shared among the light passes.
 LUCH_FN void choose_passes(const FilmLayout& layout, PathState& path, const BsdfSample& s) {
-    if (!layout.any_light_pass) return;
+    if (!wants_light_passes(layout)) return;
     path.pass_diffuse = make_vec3(s.lobe_class == CLASS_DIFFUSE ? 1.0f : 0.0f);
     path.pass_glossy = make_vec3(s.lobe_class == CLASS_GLOSSY ? 1.0f : 0.0f);
     if (s.delta) return;

@@ -9,6 +9,7 @@
 #include "luch/light/tree.h"
 #include "luch/light/triangle.h"
 #include "luch/light/world.h"
+#include "luch/plan.h"
 
 namespace luch {
 
@@ -206,23 +207,24 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
     GroupShares shares;
     group_shares(lights, q, &shares);
     if (!(shares.local + shares.suns + shares.world > 0.0f)) return no_light_sample();
-    if (u_select < shares.local) {
+    constexpr bool local_lights = plan::LAMPS || plan::EMISSIVE_MESHES;
+    if (local_lights && u_select < shares.local) {
         EmitterChoice choice = choose_local(lights, q, &shares, min_f(u_select / shares.local, 0.99999994f), u);
         if (choice.emitter == NONE) return no_light_sample();
         const Emitter& emitter = lights.emitters[choice.emitter];
         float probability = choice.probability * shares.local;
-        return emitter.lamp != NONE
-                   ? sample_chosen_lamp(lights, emitter.lamp, q, probability, u)
-                   : sample_chosen_triangle(scene, emitter, q, probability, cluster_unit(u_select, u), u);
+        if (plan::LAMPS && emitter.lamp != NONE) return sample_chosen_lamp(lights, emitter.lamp, q, probability, u);
+        if constexpr (!plan::EMISSIVE_MESHES) return no_light_sample();
+        return sample_chosen_triangle(scene, emitter, q, probability, cluster_unit(u_select, u), u);
     }
     u_select -= shares.local;
     // The last group takes what rounding leaves over.
-    if (shares.suns > 0.0f && (u_select < shares.suns || !(shares.world > 0.0f))) {
+    if (plan::SUNS && shares.suns > 0.0f && (u_select < shares.suns || !(shares.world > 0.0f))) {
         EmitterChoice choice = choose_sun(lights, q, min_f(u_select / shares.suns, 0.99999994f));
         if (choice.emitter == NONE) return no_light_sample();
         return sample_chosen_lamp(lights, lights.suns[choice.emitter], q, choice.probability * shares.suns, u);
     }
-    if (!(shares.world > 0.0f)) return no_light_sample();
+    if (!plan::WORLD_SAMPLING || !(shares.world > 0.0f)) return no_light_sample();
     return sample_chosen_world(lights.world, q, shares.world, u);
 }
 
@@ -274,7 +276,7 @@ LUCH_FN_SLOW float pdf_lamp(const SceneView& scene, Vec3 p, Vec3 n, bool transmi
 
 LUCH_FN_SLOW float pdf_world(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, Vec3 direction) {
     const LightsView& lights = *scene.lights;
-    if (!lights.world.present || !(lights.world.irradiance > 0.0f)) return 0.0f;
+    if (!plan::WORLD_SAMPLING || !lights.world.present || !(lights.world.irradiance > 0.0f)) return 0.0f;
     GroupShares shares;
     group_shares(lights, make_light_query(p, n, transmits), &shares);
     if (!(shares.world > 0.0f)) return 0.0f;

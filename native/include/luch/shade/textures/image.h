@@ -78,6 +78,7 @@ LUCH_FN Texel blend_texels(const ImageView& image, int x, int y, const float (&w
         weight[i] = clip && column[i] != x + i ? 0.0f : wx[i];
     }
     Texel sum{0.0f, 0.0f, 0.0f, 0.0f};
+    LUCH_KEEP_LOOP
     for (int j = 0; j < N; j++) {
         const int row = wrap_pixel(y + j, height, extension);
         const float row_weight = clip && row != y + j ? 0.0f : wy[j];

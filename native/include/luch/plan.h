@@ -1,0 +1,74 @@
+// What code is compiled in. 1: the effect may be there, which is then asked at run time; 0: the scene has none, and
+// neither has the code. General code has them all: the CPU's, and the kernels that are compiled ahead of time. A
+// scene's own kernels get their -D from luch/cuda/plan.py, which reads luch.effects.
+#pragma once
+
+#ifndef LUCH_PLAN_THIN_FILM
+#define LUCH_PLAN_THIN_FILM 1
+#endif
+#ifndef LUCH_PLAN_SHEEN
+#define LUCH_PLAN_SHEEN 1
+#endif
+#ifndef LUCH_PLAN_TOON
+#define LUCH_PLAN_TOON 1
+#endif
+#ifndef LUCH_PLAN_ASHIKHMIN_SHIRLEY
+#define LUCH_PLAN_ASHIKHMIN_SHIRLEY 1
+#endif
+#ifndef LUCH_PLAN_MICROFACETS
+#define LUCH_PLAN_MICROFACETS 1
+#endif
+#ifndef LUCH_PLAN_LAMPS
+#define LUCH_PLAN_LAMPS 1
+#endif
+#ifndef LUCH_PLAN_SUNS
+#define LUCH_PLAN_SUNS 1
+#endif
+#ifndef LUCH_PLAN_EMISSIVE_MESHES
+#define LUCH_PLAN_EMISSIVE_MESHES 1
+#endif
+#ifndef LUCH_PLAN_WORLD_SAMPLING
+#define LUCH_PLAN_WORLD_SAMPLING 1
+#endif
+#ifndef LUCH_PLAN_LIGHT_PASSES
+#define LUCH_PLAN_LIGHT_PASSES 1
+#endif
+#ifndef LUCH_PLAN_DATA_PASSES
+#define LUCH_PLAN_DATA_PASSES 1
+#endif
+#ifndef LUCH_PLAN_DENOISING_PASSES
+#define LUCH_PLAN_DENOISING_PASSES 1
+#endif
+#ifndef LUCH_PLAN_AMBIENT_OCCLUSION
+#define LUCH_PLAN_AMBIENT_OCCLUSION 1
+#endif
+#ifndef LUCH_PLAN_FILTER_GLOSSY
+#define LUCH_PLAN_FILTER_GLOSSY 1
+#endif
+#ifndef LUCH_PLAN_HOLDOUT
+#define LUCH_PLAN_HOLDOUT 1
+#endif
+#ifndef LUCH_PLAN_CLAMPING
+#define LUCH_PLAN_CLAMPING 1
+#endif
+
+namespace luch::plan {
+
+inline constexpr bool THIN_FILM = LUCH_PLAN_THIN_FILM;
+inline constexpr bool SHEEN = LUCH_PLAN_SHEEN;  // Sheen and velvet lobes
+inline constexpr bool TOON = LUCH_PLAN_TOON;
+inline constexpr bool ASHIKHMIN_SHIRLEY = LUCH_PLAN_ASHIKHMIN_SHIRLEY;
+inline constexpr bool MICROFACETS = LUCH_PLAN_MICROFACETS;
+inline constexpr bool LAMPS = LUCH_PLAN_LAMPS;  // other than suns
+inline constexpr bool SUNS = LUCH_PLAN_SUNS;
+inline constexpr bool EMISSIVE_MESHES = LUCH_PLAN_EMISSIVE_MESHES;
+inline constexpr bool WORLD_SAMPLING = LUCH_PLAN_WORLD_SAMPLING;
+inline constexpr bool LIGHT_PASSES = LUCH_PLAN_LIGHT_PASSES;
+inline constexpr bool DATA_PASSES = LUCH_PLAN_DATA_PASSES;
+inline constexpr bool DENOISING_PASSES = LUCH_PLAN_DENOISING_PASSES;
+inline constexpr bool AMBIENT_OCCLUSION = LUCH_PLAN_AMBIENT_OCCLUSION;
+inline constexpr bool FILTER_GLOSSY = LUCH_PLAN_FILTER_GLOSSY;
+inline constexpr bool HOLDOUT = LUCH_PLAN_HOLDOUT;
+inline constexpr bool CLAMPING = LUCH_PLAN_CLAMPING;
+
+}  // namespace luch::plan

@@ -1,0 +1,49 @@
+"""What a scene's own kernels are compiled without: LUCH_PLAN_... of native/include/luch/plan.h, from luch.effects.
+
+The rule is one-sided: code is left out only where no effect that needs it is on. The picture is the same, bit for bit.
+"""
+
+from __future__ import annotations
+
+from luch.effects import Effects
+
+# Define -> effects that need it, by their names in luch.effects; a name that ends in * stands for all that begin so.
+NEEDED_BY: dict[str, tuple[str, ...]] = {
+    "THIN_FILM": ("thin film",),
+    "SHEEN": ("sheen",),
+    "LAMPS": ("point lamps", "spot lamps", "area lamps"),
+    "SUNS": ("sun lamps",),
+    "EMISSIVE_MESHES": ("emissive meshes",),
+    "WORLD_SAMPLING": ("world light sampling",),
+    "LIGHT_PASSES": ("pass Diffuse Direct", "pass Diffuse Indirect", "pass Glossy Direct", "pass Glossy Indirect",
+                     "pass Transmission Direct", "pass Transmission Indirect", "pass Emission", "pass Environment",
+                     "pass Ambient Occlusion", "light groups"),
+    "DATA_PASSES": ("pass Depth", "pass Mist", "pass Position", "pass Normal", "pass UV", "pass Object Index",
+                    "pass Material Index", "pass Diffuse Color", "pass Glossy Color", "pass Transmission Color",
+                    "pass Diffuse Direct", "pass Diffuse Indirect", "pass Glossy Direct", "pass Glossy Indirect",
+                    "pass Transmission Direct", "pass Transmission Indirect", "pass Denoising Albedo",
+                    "pass Denoising Normal", "cryptomatte", "AOVs"),
+    "DENOISING_PASSES": ("pass Denoising Albedo", "pass Denoising Normal"),
+    "AMBIENT_OCCLUSION": ("pass Ambient Occlusion",),
+    "FILTER_GLOSSY": ("filter glossy",),
+    "HOLDOUT": ("holdout",),
+    "CLAMPING": ("clamping",),
+}  # fmt: skip
+# Define -> operations of shader programs that make such lobes.
+MADE_BY: dict[str, tuple[str, ...]] = {
+    "TOON": ("CLOSURE_TOON",),
+    "ASHIKHMIN_SHIRLEY": ("CLOSURE_GLOSSY",),
+    "MICROFACETS": ("CLOSURE_GLOSSY", "CLOSURE_METALLIC", "CLOSURE_GLASS", "CLOSURE_REFRACTION", "CLOSURE_PRINCIPLED"),
+}
+
+
+def plan_of(effects: Effects, operations: set[str]) -> dict[str, bool]:
+    """Which code a scene needs. operations: names of those that its programs hold."""
+    plan = {define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()}
+    plan |= {define: any(name in operations for name in names) for define, names in MADE_BY.items()}
+    return plan
+
+
+def flags(plan: dict[str, bool]) -> list[str]:
+    """For the compiler."""
+    return [f"-DLUCH_PLAN_{define}={int(needed)}" for define, needed in sorted(plan.items())]
