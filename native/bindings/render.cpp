@@ -1,20 +1,25 @@
 // The renderer as Python sees it: one scene, rendered in steps, readable at any time between them.
 #include <algorithm>
 #include <cstddef>
+#include <optional>
+
+#include <pybind11/stl.h>
 
 #include "bindings/bind.h"
 #include "bindings/device_image.h"
 #include "bindings/film.h"
 #include "bindings/scene_reader.h"
+#include "bindings/scene_trees.h"
 
 namespace luch::bindings {
 namespace {
 
 class PyRenderer {
  public:
-    PyRenderer(const py::object& scene, bool for_device) {
+    PyRenderer(const py::object& scene, bool for_device, std::optional<u64> device_builds_from) {
         ReadScene read = read_scene(scene);
         read.input.for_device = for_device;
+        if (device_builds_from) read.input.device_builds_from = *device_builds_from;
         dropped_instances_ = read.dropped_instances;
         renderer_ = std::make_unique<cpu::Renderer>(std::move(read.store), read.input);
     }
@@ -34,13 +39,15 @@ class PyRenderer {
 
     py::dict passes() const { return resolve_film(renderer_->film()); }
 
-    // (blocks, links) as bindings/device_image.h has them: of the RenderTask and of the structure.
+    // (blocks, links) as bindings/device_image.h has them, of the RenderTask and of the structure; and the groups whose
+    // trees the device builds (bindings/scene_trees.h), with the depth of the rest.
     static py::tuple device_images(const py::object& self) {
         cpu::Renderer& renderer = *self.cast<PyRenderer&>().renderer_;
         cpu::DeviceImage trees;
         renderer.trees().append(trees);
         return py::make_tuple(bindings::device_image(renderer.device_image(), self),
-                              bindings::device_image(trees, self));
+                              bindings::device_image(trees, self), left_groups(renderer.trees(), self),
+                              renderer.trees().stats().depth);
     }
 
     // The film's sums (pixels, channels) float64 and sample counts (pixels,) uint32, to be written by whoever renders
@@ -171,7 +178,8 @@ void bind_render(py::module_& m) {
     render.def("task_fields", &task_fields);
     render.def("task_sizes", &task_sizes);
     py::class_<PyRenderer>(render, "Renderer")
-        .def(py::init<const py::object&, bool>(), py::arg("scene"), py::arg("for_device") = false,
+        .def(py::init<const py::object&, bool, std::optional<u64>>(), py::arg("scene"), py::arg("for_device") = false,
+             py::arg("device_builds_from") = py::none(),
              "Reads the scene. Raises ValueError, naming the object, for data that does not fit together.")
         .def("prepare", &PyRenderer::prepare, "Builds structures and lights, once, first of all. False when cancelled.")
         .def("render", &PyRenderer::render, py::arg("first"), py::arg("count"),

@@ -92,7 +92,9 @@ void Renderer::build_accel() {
 }
 
 void Renderer::build_device_trees() {
-    trees_ = SceneTrees::build(scene_.view, store_->transparency_flags(), pool_, input_.accel.choice);
+    AccelChoice choice = input_.accel.choice;
+    choice.leave_from = input_.device_builds_from;
+    trees_ = SceneTrees::build(scene_.view, store_->transparency_flags(), pool_, choice);
     stats_.accel_name = input_.accel.choice.wide ? "CWBVH" : accel_name(input_.accel.choice);
     stats_.accel_reason = input_.accel.automatic ? "on CUDA the compressed wide tree is the fastest in all measured "
                                                    "scenes (docs/rays.md)"

@@ -28,6 +28,7 @@ struct RenderInput {
     bool light_tree = true;
     AccelRequest accel;
     bool for_device = false;  // another device traces: no structures of this processor, no batches
+    u64 device_builds_from = ~u64(0);  // triangles of a group whose tree that device builds itself
     CameraView camera{};
     u32 frame_width = 0, frame_height = 0;  // pixels of the full frame
     PixelFilter filter{};
