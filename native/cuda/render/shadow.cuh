@@ -17,9 +17,9 @@ struct OneRay {
 };
 
 __device__ __forceinline__ Color shadow_transmittance(const RenderTask& task, const SceneTrees& trees, u32 k,
-                                                      const PathState& path) {
+                                                      const ShadowRay& shadow) {
     const Wavefront& wave = task.wave;
-    if (!wave.shadows[k].casts || wave.blocked[k] == BLOCKED_NOT) return make_vec3(1.0f);
+    if (!shadow.casts || wave.blocked[k] == BLOCKED_NOT) return make_vec3(1.0f);
 #if LUCH_TRANSPARENT
     if (wave.blocked[k] == BLOCKED_MAYBE) {
         ShadePoints points;
@@ -27,7 +27,8 @@ __device__ __forceinline__ Color shadow_transmittance(const RenderTask& task, co
         PointShader shader{task.scene.view, set};
         OneRay tracer{trees};
         u64 steps = 0, rays = 0;
-        Color through = walk_transparent(task.scene, wave.shadow_rays[k], path, tracer, shader, points, &steps, &rays);
+        Color through =
+            walk_transparent(task.scene, wave.shadow_rays[k], shadow, tracer, shader, points, &steps, &rays);
         add_total(wave, TOTAL_TRANSPARENT_STEPS, steps);
         add_total(wave, TOTAL_TRANSPARENT_RAYS, rays);
         return through;
@@ -46,7 +47,7 @@ extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK)
     if (k >= wave.counters[WAVE_SHADOWS]) return;
     ShadowRay shadow = wave.shadows[k];
     PathState path = load_path(wave, shadow.path);
-    Color through = shadow_transmittance(task, trees, k, path);
+    Color through = shadow_transmittance(task, trees, k, shadow);
     if (is_zero(through)) return;
     FilmWriter writer = film_of_slot(task, shadow.path);
     add_direct(task.scene, writer, path, shadow, through);
