@@ -192,3 +192,22 @@ def test_a_shadow_through_veils_ends_as_in_cycles(scene: bpy.types.Scene, render
     scene.cycles.max_bounces, scene.cycles.transparent_max_bounces = 0, limit
     ours, theirs = (render(engine, width=8, height=8, samples=256)[..., :3].mean() for engine in ("LUCH", "CYCLES"))
     assert ours == pytest.approx(theirs, rel=0.01)
+
+
+def test_a_glowing_box_that_casts_no_shadow_shines_through_itself(scene: bpy.types.Scene, render: Render) -> None:
+    """How much is a matter of sampling, in Cycles too: rays that find the box see its near faces alone."""
+    stage(scene)
+    bpy.ops.mesh.primitive_cube_add(location=(1.0, 0.0, 1.5))
+    box = bpy.context.object
+    glow = bpy.data.materials.new("Glow")
+    shader = glow.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Emission Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    shader.inputs["Emission Strength"].default_value = 3.0
+    box.data.materials.append(glow)
+    box.visible_camera = False
+    picture = {"width": 16, "height": 12, "samples": 128}
+    shut = render("LUCH", **picture)[..., :3].mean()
+    box.visible_shadow = False
+    ours, theirs = (render(engine, **picture)[..., :3].mean() for engine in ("LUCH", "CYCLES"))
+    assert ours == pytest.approx(theirs, rel=0.1)
+    assert ours > 1.3 * shut

@@ -106,7 +106,8 @@ class Collector {
 
  private:
     u32 sides_of(const InstanceView& at) {
-        if (!all_light(scene_, at)) return 3u;
+        // Through faces that cast no shadow the inner sides shine as well.
+        if (!all_light(scene_, at) || !(at.visibility & RAY_SHADOW)) return 3u;
         auto [found, fresh] = sides_.try_emplace(at.mesh, 3u);
         if (fresh) found->second = outer_sides(scene_, scene_.meshes[at.mesh]);
         return found->second;
