@@ -20,7 +20,12 @@ from support.instances import ALL, Scene, crowd, placed
 from buildtools.kernels import faults, table
 
 FIBERS, GPU = "fibers", "cuda"
-FEW = ("BRUTE_FORCE", "BVH2", "CWBVH")  # for the fibers: the others' kernels are the same template, and slow to compile
+FEW = (
+    "BRUTE_FORCE",
+    "BVH2",
+    "CWBVH",
+    "KD_TREE",
+)  # for the fibers: the others' kernels are the same template, and slow to compile
 PRECISIONS = ("FAST", "WATERTIGHT", "DOUBLE")
 
 

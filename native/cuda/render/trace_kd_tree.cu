@@ -1,3 +1,3 @@
-#include "luch/accel/kd_tree.h"
-#define LUCH_VIEW luch::KdTree
+#include "rays/kd_tree.cuh"
+#define LUCH_VIEW luch::ShortStackKdTree
 #include "render/trace_generic.cuh"
