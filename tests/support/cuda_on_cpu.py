@@ -153,7 +153,7 @@ def fake_cupy() -> Any:
         id=0, compute_capability="90", attributes={"MaxThreadsPerMultiProcessor": 2048, "MultiProcessorCount": 2}
     )
     driver = types.SimpleNamespace(
-        moduleLoadData=module_load_data, moduleGetFunction=module_get_function, launchKernel=launch_kernel,
+        moduleLoadData=module_load_data, moduleUnload=lambda module: None, moduleGetFunction=module_get_function, launchKernel=launch_kernel,
         funcGetAttribute=lambda attribute, function: 32,
         occupancyMaxActiveBlocksPerMultiprocessor=lambda function, block, shared: 2,
     )  # fmt: skip
@@ -206,5 +206,5 @@ def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
 
 def forget() -> None:
     """What was loaded for the device so far."""
-    for cached in (device.cupy, device.available, compiler.load):
+    for cached in (device.cupy, device.available, compiler.load, compiler.scene_module):
         cached.cache_clear()

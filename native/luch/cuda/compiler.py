@@ -21,6 +21,8 @@ from typing import Any, NamedTuple
 from luch.cuda.device import DeviceError, Module, architecture_of, cupy
 
 PACKAGE = Path(__file__).resolve().parents[1]
+# Scenes whose kernels stay on the device: some megabytes each.
+SCENES_KEPT = 8
 AHEAD = PACKAGE / "kernels"  # NAME.cubin, compiled by build.py
 SCENE_PROGRAMS = "luch_scene_programs.cuh"  # the header that a scene's own kernels include
 
@@ -90,6 +92,12 @@ def compiled(module: str, precision: str, architecture: int) -> bytes:
 
     unit = _Unit(module, precision, architecture, "", ())
     return _kept(_cache_name(nvrtc, unit)) or _compile_and_keep(nvrtc, unit)
+
+
+@functools.lru_cache(maxsize=SCENES_KEPT)
+def scene_module(image: bytes, device: int) -> Module:
+    """A scene's kernels on a device, loaded once however often the scene is rendered."""
+    return Module(image)
 
 
 def kept_scene(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -135,11 +136,12 @@ class Kernel:
 
 
 class Module:
-    """A loaded cubin or PTX; stays loaded as long as the process."""
+    """A loaded cubin or PTX; unloaded with its last user, but for the end of the process, when the driver goes first."""
 
     def __init__(self, image: bytes) -> None:
         enter_context()
         self._module = cupy().cuda.driver.moduleLoadData(image)
+        weakref.finalize(self, cupy().cuda.driver.moduleUnload, self._module).atexit = False
         self._kernels: dict[str, Kernel] = {}
 
     def kernel(self, name: str) -> Kernel:

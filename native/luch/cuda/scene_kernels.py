@@ -52,7 +52,7 @@ class SceneKernels:
         architecture = architecture_of(cupy())
         kept = compiler.kept_scene(STAGES, self._precision, architecture, self._text, self._flags)
         if kept is not None:
-            self._module = Module(kept)
+            self._module = self._loaded(kept)
             return
         usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
         general = compiler.ahead(STAGES, self._precision, architecture) if usable else None
@@ -60,7 +60,7 @@ class SceneKernels:
             self._compile(architecture)
             self._take()
             return
-        self._module, self.general = Module(general), True
+        self._module, self.general = self._loaded(general), True
         threading.Thread(target=self._compile, args=(architecture,), daemon=True).start()
 
     def _compile(self, architecture: int) -> None:
@@ -75,7 +75,10 @@ class SceneKernels:
         if self._failure is not None:
             raise DeviceError(f"The kernels of this scene do not compile: {self._failure}") from self._failure
         if self._ready is not None:
-            self._module, self._ready, self.general = Module(self._ready), None, False
+            self._module, self._ready, self.general = self._loaded(self._ready), None, False
+
+    def _loaded(self, image: bytes) -> Module:
+        return compiler.scene_module(image, int(cupy().cuda.Device().id))
 
     def kernel(self, name: str) -> Kernel:
         """Between two waves the scene's own kernels take over from the general ones: the same results."""
