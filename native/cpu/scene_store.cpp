@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "cpu/geometry/world_normals.h"
+
 namespace luch::cpu {
 namespace {
 
@@ -241,6 +243,7 @@ void SceneStore::resolve_attributes() {
 
 const SceneView& SceneStore::finish() {
     resolve_attributes();
+    blend_normals_in_world(meshes_, instances_, normals_);
     view_.positions = positions_.data();
     view_.triangles = triangles_.data();
     view_.material_slots = material_slots_.data();

@@ -150,3 +150,23 @@ def test_an_attribute_of_the_view_layer_may_be_the_worlds(scene: bpy.types.Scene
     bpy.context.object.data.materials.append(material)
     look_down(scene, 3.0)
     assert_same_picture(render)
+
+
+@pytest.mark.parametrize("users", [1, 2])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_normals_of_an_unevenly_scaled_object_are_those_of_cycles(
+    scene: bpy.types.Scene, render: Render, users: int, mirrored: bool
+) -> None:
+    """Blended in the world where the mesh is drawn once, in the object's space where it is shared."""
+    bpy.ops.mesh.primitive_cylinder_add(vertices=8, rotation=(1.2, 0.2, 0.4))
+    bpy.ops.object.shade_smooth()
+    cylinder = bpy.context.object
+    cylinder.scale = (0.4, -1.0 if mirrored else 1.0, 1.4)
+    cylinder.data.materials.append(show("ShaderNodeNewGeometry", "Normal"))
+    if users == 2:
+        twin = bpy.data.objects.new("Twin", cylinder.data)
+        twin.location.x = 1.5
+        twin.scale = (1.0, 0.3, 0.6)
+        scene.collection.objects.link(twin)
+    look_down(scene, 4.0)
+    assert_same_picture(render, edge_share=0.03)

@@ -24,7 +24,12 @@ struct MeshView {
     u32 first_sphere, sphere_count;      // into spheres; sphere k is primitive triangle_count + k
 };
 
-enum InstanceFlag : u32 { INSTANCE_HOLDOUT = 1u, INSTANCE_SHADOW_CATCHER = 2u, INSTANCE_MIRRORED = 4u };
+enum InstanceFlag : u32 {
+    INSTANCE_HOLDOUT = 1u,
+    INSTANCE_SHADOW_CATCHER = 2u,
+    INSTANCE_MIRRORED = 4u,
+    INSTANCE_WORLD_NORMALS = 8u,  // its mesh's normals become unit in the world, not before
+};
 
 struct InstanceView {
     Affine to_world, to_object;

@@ -45,7 +45,7 @@ LUCH_FN SmoothSurface smooth_surface(const SceneView& scene, const MeshView& mes
     limit_to_tangent(n1, e12, -e01, v, w, &above, &below);
     limit_to_tangent(n2, e20, -e12, w, u, &above, &below);
     // Normals shrink as the object grows: so much it is scaled along them.
-    float scale = safe_divide(length_squared(sum), length(n));
+    float scale = instance.flags & INSTANCE_WORLD_NORMALS ? length(n) : safe_divide(length_squared(sum), length(n));
     return {normalize_or(n, face_normal), above * scale, below * scale};
 }
 
