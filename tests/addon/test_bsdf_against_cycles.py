@@ -5,8 +5,11 @@ directional albedo), of light concentrated on one side, and of light from above.
 board; ours are means of closure samples. Every difference must lie within 0.2 % and the noise of both.
 
 The world is found by closure samples only. Cycles' lights would add to rough refraction: its evaluation
-also counts facets that are seen from behind (0.6 % at roughness 0.6), which no sample ever meets; ours
-does not. Its Ashikhmin-Shirley sampling likewise turns rejected half vectors back up at grazing angles.
+also counts facets that are seen from behind (0.6 % at roughness 0.6 from above, several times the light at
+roughness 1 and grazing angles), which no sample ever meets; ours does not. Its Ashikhmin-Shirley sampling
+likewise turns rejected half vectors back up at grazing angles: at roughness 0.8 and 75 degrees a white world
+gives 0.638, where the integral of the function that both engines evaluate alike (lamps agree to 1e-5) is 0.4965,
+which is what ours gives.
 """
 
 from __future__ import annotations
