@@ -39,7 +39,7 @@ __device__ __forceinline__ Color shadow_transmittance(const RenderTask& task, co
 
 }  // namespace luch
 
-extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK)
+extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK, LUCH_STAGE_BLOCKS)
     add_shadows(const __grid_constant__ luch::RenderTask task, const __grid_constant__ luch::SceneTrees trees) {
     using namespace luch;
     const Wavefront& wave = task.wave;

@@ -37,5 +37,11 @@ struct PointShader {
 
 }  // namespace luch
 
-#define LUCH_STAGE(name) \
-    extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK) name(const __grid_constant__ luch::RenderTask task)
+// Blocks of a stage that a multiprocessor must hold: what a thread may keep in registers (4: 128, 5: 96, 6: 80, 8: 64).
+#ifndef LUCH_STAGE_BLOCKS
+#define LUCH_STAGE_BLOCKS 4
+#endif
+
+#define LUCH_STAGE(name)                                                               \
+    extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK, LUCH_STAGE_BLOCKS) \
+        name(const __grid_constant__ luch::RenderTask task)

@@ -39,13 +39,16 @@ __device__ __noinline__ void light_surface(const RenderTask& task, const PathSta
 }
 
 // The path's next ray, if it goes on.
-__device__ __noinline__ void send_on(const RenderTask& task, FilmWriter& writer, PathState& path, u32 slot,
-                                     const ShadePoints& points, const ClosureSet& set, const SurfacePoint& spawn,
-                                     Vec3 direction, float distance) {
+__device__ __noinline__ void send_on(const RenderTask& task, PathState& path, u32 slot, const ShadePoints& points,
+                                     const ClosureSet& set, const SurfacePoint& spawn, Vec3 direction, float distance) {
     const Wavefront& wave = task.wave;
     Ray next;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
-    if (!scatter(task.scene, writer, path, points, 0, set, spawn, u, direction, distance, &next)) return;
+    u64 rejected = 0;
+    bool goes_on =
+        scatter(task.scene, task.film.layout, path, points, 0, set, spawn, u, direction, distance, &next, &rejected);
+    add_total(wave, TOTAL_REJECTED, rejected);
+    if (!goes_on) return;
     u32 at = append(wave, WAVE_NEXT_RAYS);
     wave.next_rays[at] = next;
     wave.next_slot[at] = slot;
@@ -81,7 +84,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
             make_ao_ray(scene, path, slot, points, 0, set, spawn, &ao_ray, &ao);
             push_shadow(wave, ao_ray, ao);
         }
-        send_on(task, writer, path, slot, points, set, spawn, ray.direction, hit.t);
+        send_on(task, path, slot, points, set, spawn, ray.direction, hit.t);
         store_path(wave, slot, path);
     }
     add_total(wave, TOTAL_REJECTED, writer.rejected);

@@ -118,10 +118,11 @@ LUCH_FN Ray ray_from(const SurfacePoint& spawn, Vec3 ng, Vec3 direction) {
 }
 
 // Chooses where the path goes on; false when it ends. u: two numbers for the direction, one for the choice of lobe;
-// incoming: direction and hit distance of the ray that came here. The next ray goes to *next.
-LUCH_FN bool scatter(const RenderView& scene, FilmWriter& writer, PathState& path, const ShadePoints& points, int lane,
-                     const ClosureSet& set, const SurfacePoint& spawn, Vec3 u, Vec3 incoming, float distance,
-                     Ray* next) {
+// incoming: direction and hit distance of the ray that came here. The next ray goes to *next;
+// *rejected counts what is not finite.
+LUCH_FN bool scatter(const RenderView& scene, const FilmLayout& layout, PathState& path, const ShadePoints& points,
+                     int lane, const ClosureSet& set, const SurfacePoint& spawn, Vec3 u, Vec3 incoming, float distance,
+                     Ray* next, u64* rejected) {
     float through = average(set.transparent), lobes = lobe_weight_sum(set);
     if (!(through + lobes > 0.0f)) return false;
     Vec3 ng = lane_face_normal(points, lane);
@@ -139,10 +140,10 @@ LUCH_FN bool scatter(const RenderView& scene, FilmWriter& writer, PathState& pat
     BsdfSample s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
     if (!(s.pdf_sa > 0.0f) || is_zero(s.throughput)) return false;
     if (!finite_v(s.throughput)) {
-        ++writer.rejected;
+        ++*rejected;
         return false;
     }
-    if (!(path.flags & PATH_PASS_CHOSEN)) choose_passes(writer.film.layout, path, s);
+    if (!(path.flags & PATH_PASS_CHOSEN)) choose_passes(layout, path, s);
     float lobe_probability = 1.0f - through_probability;
     path.throughput *= s.throughput * (1.0f / lobe_probability);
     path.mis_pdf = s.pdf_sa * lobe_probability;
