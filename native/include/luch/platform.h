@@ -27,9 +27,6 @@
 #define __builtin_floorf floorf
 #define __builtin_ceilf ceilf
 #define __builtin_truncf truncf
-#define __builtin_sinhf sinhf
-#define __builtin_coshf coshf
-#define __builtin_tanhf tanhf
 #endif
 
 namespace luch {

@@ -92,9 +92,9 @@ LUCH_FLOAT_OP1(OpMathArcsine, asin_f(a));
 LUCH_FLOAT_OP1(OpMathArccosine, acos_f(a));
 LUCH_FLOAT_OP1(OpMathArctangent, atan_f(a));
 LUCH_FLOAT_OP2(OpMathArctan2, a == 0.0f && b == 0.0f ? 0.0f : atan2_f(a, b));
-LUCH_FLOAT_OP1(OpMathSinh, __builtin_sinhf(a));
-LUCH_FLOAT_OP1(OpMathCosh, __builtin_coshf(a));
-LUCH_FLOAT_OP1(OpMathTanh, __builtin_tanhf(a));
+LUCH_FLOAT_OP1(OpMathSinh, sinh_f(a));
+LUCH_FLOAT_OP1(OpMathCosh, cosh_f(a));
+LUCH_FLOAT_OP1(OpMathTanh, tanh_f(a));
 LUCH_FLOAT_OP1(OpMathRadians, a*(PI / 180.0f));
 LUCH_FLOAT_OP1(OpMathDegrees, a * (180.0f / PI));
 
