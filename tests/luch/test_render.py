@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from luch.accel import KINDS
+from luch.cuda import device
 from luch.render import Progress, render
 from luch.scene import Camera, Film, Instances, Material, Mesh, Object, Scene, Settings
 from luch.shader import ProgramBuilder
@@ -87,3 +90,22 @@ def test_a_render_that_goes_on_is_told_of_building_then_of_samples() -> None:
     kinds = [progress.preparing for progress in told]
     assert kinds == sorted(kinds, reverse=True)
     assert told[-1].samples == 4
+
+
+def test_without_a_gpu_the_cpu_goes_on_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cupy", None)  # as where it is not installed
+    device.cupy.cache_clear()
+    scene = heavy_scene(100)
+    asked = replace(scene, settings=replace(scene.settings, device="CUDA"))
+    result = render(asked)
+    device.cupy.cache_clear()
+    assert result.stats["device"] == "CPU"
+    assert len(result.stats["warnings"]) == 1
+    assert result.stats["warnings"][0].startswith("Rendered on the CPU: CUDA needs CuPy")
+    assert np.array_equal(result.passes["Combined"], render(scene).passes["Combined"])
+
+
+def test_an_unknown_device_is_refused_by_name() -> None:
+    scene = heavy_scene(100)
+    with pytest.raises(ValueError, match="'TPU'; it can be CPU or CUDA"):
+        render(replace(scene, settings=replace(scene.settings, device="TPU")))
