@@ -63,6 +63,7 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         with ResultWriter(self, depsgraph.view_layer.name, scene.film) as writer:
             result = render.render(scene, progress=lambda progress: reporter.progress(progress, writer))
             writer.write(result.passes)
+        reporter.show(result.stats["warnings"][len(scene.warnings) :])
         stats = reporter.statistics(scene, result.stats)
         last_stats[depsgraph.scene.name] = stats
         writer.stamp(stats, scene)

@@ -39,6 +39,10 @@ class Reporter:
     def warn(self, warnings: list[str]) -> None:
         """Show each warning of the export in the info area; the export has ended here."""
         self._export_s = time.monotonic() - self._started
+        self.show(warnings)
+
+    def show(self, warnings: list[str]) -> None:
+        """In the info area, each on a line of its own."""
         for warning in warnings:
             self._engine.report({"WARNING"}, warning)
 
@@ -67,7 +71,6 @@ class Reporter:
             "export_seconds": round(self._export_s, 4),
             "total_seconds": round(time.monotonic() - self._started, 4),
             "cancelled": self.cancelled,
-            "warnings": list(scene.warnings),
         }
 
     def _show_picture(self, progress: Any, writer: ResultWriter) -> None:

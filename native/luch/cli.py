@@ -99,6 +99,8 @@ def _render(options: argparse.Namespace) -> int:
             return not interrupt.asked
 
         result = render(scene, progress=watch)
+    for warning in result.stats.get("warnings", [])[len(scene.warnings) :]:
+        print(f"luch: {warning}", file=sys.stderr)
     if suffix == ".png":
         image.write_png(options.output, result.passes["Combined"], metadata=_statistics(result))
     else:
