@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import functools
 import sys
+from typing import Any, NoReturn
 
 
 class CommandLineError(ValueError):
@@ -16,7 +17,7 @@ class CommandLineError(ValueError):
 
 
 class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> None:  # type: ignore[override]
+    def error(self, message: str) -> NoReturn:
         raise CommandLineError(f"Command line: {message}. Luch knows {', '.join(OPTIONS)}.")
 
 
@@ -24,7 +25,7 @@ OPTIONS = ("--luch-device CPU|CUDA",)
 
 
 @functools.cache
-def overrides(words: tuple[str, ...]) -> dict[str, str]:
+def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     """Names of luch.scene.Settings -> values. words: sys.argv. Raises CommandLineError."""
     if "--" not in words:
         return {}
@@ -38,6 +39,6 @@ def overrides(words: tuple[str, ...]) -> dict[str, str]:
     return {name.removeprefix("luch_"): value for name, value in vars(found).items() if value is not None}
 
 
-def current() -> dict[str, str]:
+def current() -> dict[str, Any]:
     """Of this process."""
     return overrides(tuple(sys.argv))
