@@ -85,7 +85,6 @@ class PyRenderer {
         facts["materials"] = scene.view.material_count;
         facts["structure"] = cpu::accel_name({false, renderer_->trees().kind()});
         facts["one_group"] = renderer_->trees().is_one_group();
-        facts["find_light"] = scene.has_visible_lamps || scene.has_world;
         return facts;
     }
 

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from luch.render import render
+from luch.cuda import device
+from luch.cuda import render as device_render
+from luch.render import Progress, render
 from luch.scene import Camera, Film, Instances, Light, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder
 from support import cuda_on_cpu
@@ -157,3 +159,32 @@ def test_code_for_what_the_scene_lacks_changes_no_bit(place: str) -> None:
     absent = {name for name, needed in lean.stats["kernel_plan"].items() if not needed}
     assert absent >= {"THIN_FILM", "MICROFACETS", "SUNS", "EMISSIVE_MESHES", "WORLD_SAMPLING", "LIGHT_PASSES", "SHEEN"}
     assert lean.stats["kernel_plan"]["LAMPS"]
+
+
+def test_a_picture_larger_than_a_wave_is_the_same(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
+    whole = render(scene)
+    monkeypatch.setattr(device_render, "MOST_PATHS", 96)  # of 280 pixels
+    monkeypatch.setattr(device_render, "FEWEST_PATHS", 96)
+    parts = render(scene)
+    assert parts.stats["paths_at_once"] == 96
+    assert np.array_equal(whole.passes["Combined"], parts.passes["Combined"])
+
+
+def test_a_cancel_keeps_the_samples_so_far(place: str) -> None:
+    scene = replace(plain(), settings=replace(plain().settings, device="CUDA", samples=1 << 14))
+
+    def stop(progress: Progress) -> bool:
+        return progress.samples == 0
+
+    result = render(scene, progress=stop)
+    assert result.cancelled
+    assert 1 <= result.stats["samples"] < 1 << 14
+    assert result.passes["Combined"][..., :3].mean() > 0.01
+
+
+def test_too_little_memory_is_told_with_its_remedy(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
+    monkeypatch.setattr(device_render, "MEMORY_SHARE", 1e-9)
+    with pytest.raises(device.DeviceError, match=r"GiB free; the film of this picture and .* paths need more"):
+        render(scene)

@@ -189,6 +189,9 @@ def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
             module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]
         ) -> bytes:
             own = folder / hashlib.sha256((programs + " ".join(defines)).encode()).hexdigest()[:8]
+            library = own / f"{compiler.source_of(module).stem}_{precision}.so"
+            if library.exists():
+                return str(library).encode()
             own.mkdir(exist_ok=True)
             (own / compiler.SCENE_PROGRAMS).write_text(programs)
             source, folders = compiler.source_of(module), [*compiler.source_folders(), own]

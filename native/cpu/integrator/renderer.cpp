@@ -136,9 +136,7 @@ void Renderer::find_constants() {
     }
     scene_.material_emission = scene_.emission_of_materials.data();
     for (const LampInput& lamp : input_.lamps) {
-        if (!lamp.has_program) continue;
-        scene_.has_lamp_programs = true;
-        registers = std::max(registers, size_t(lamp.program.register_count));
+        if (lamp.has_program) registers = std::max(registers, size_t(lamp.program.register_count));
     }
     scene_.max_registers = registers;
     scene_.has_world = input_.world.present;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import threading
 import time
 from typing import Any
@@ -85,8 +84,3 @@ class SceneKernels:
         self._take()
         assert self._module is not None
         return self._module.kernel(name)
-
-    @property
-    def key(self) -> str:
-        """Names the code: two scenes with the same one share their kernels."""
-        return hashlib.sha256("\0".join([self._text, *self._flags]).encode()).hexdigest()[:16]

@@ -28,7 +28,6 @@ struct RenderView {
     bool has_visible_lamps;   // lamps of finite size that rays may meet
     bool has_world;           // one that is not black
     bool can_meet_light;      // a ray may come upon an emitter, a lamp or the world by itself
-    bool has_lamp_programs;   // some lamp has a node tree
     u32 world_visibility, world_lightgroup;
     ConstantEmission world_emission;
     float mist_start, mist_inverse_depth, mist_exponent;
