@@ -33,10 +33,10 @@ def table() -> Dict[str, Any]:
 
 
 def units() -> List[Unit]:
-    """Every module and tracer in every precision."""
+    """Every module and tracer in every precision; the longest to compile, the stages, first."""
     precisions = [name for name in table()["flags"] if name != "all"]
-    return [(module, precision) for module in _traced() for precision in precisions] + [
-        (name, DEFAULT) for name in [*table()["builders"], *table()["stages"]]
+    return [(name, DEFAULT) for name in [*table()["stages"], *table()["builders"]]] + [
+        (module, precision) for module in _traced() for precision in precisions
     ]
 
 
