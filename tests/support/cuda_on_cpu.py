@@ -150,7 +150,10 @@ def fake_cupy() -> Any:
         functions[function](ctypes.c_void_p(parameters), grid, block)
 
     device = types.SimpleNamespace(
-        id=0, compute_capability="90", attributes={"MaxThreadsPerMultiProcessor": 2048, "MultiProcessorCount": 2}
+        id=0,
+        compute_capability="90",
+        synchronize=lambda: None,
+        attributes={"MaxThreadsPerMultiProcessor": 2048, "MultiProcessorCount": 2},
     )
     driver = types.SimpleNamespace(
         moduleLoadData=module_load_data, moduleUnload=lambda module: None, moduleGetFunction=module_get_function, launchKernel=launch_kernel,
