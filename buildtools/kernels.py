@@ -57,22 +57,29 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
     found = nvcc
     FOLDER.mkdir(parents=True, exist_ok=True)
 
-    def compile_unit(unit: Unit) -> str:
+    def to_ptx(unit: Unit) -> str:
         module, precision = unit
-        ptx = ptx_of(unit)
         flags = table()["flags"]["all"] + table()["flags"][precision]
         folders = ["-I", str(NATIVE / "include"), "-I", str(NATIVE / "cuda")]
         source = NATIVE / "cuda" / {**_traced(), **table()["builders"], **table()["stages"]}[module]
-        errors = _errors([found, "-ptx", f"-arch=compute_{OLDEST}", *flags, *folders, str(source), "-o", str(ptx)])
-        known = table()["architectures"]
-        chosen = known if everywhere or precision == DEFAULT else [known[0], known[-1]]
-        for architecture in [] if errors else chosen:
-            cubin = ptx.with_name(f"{ptx.stem}-sm_{architecture}.cubin")
-            errors += _errors([_ptxas(found), f"-arch=sm_{architecture}", str(ptx), "-o", str(cubin)])
-        return errors
+        return _errors(
+            [found, "-ptx", f"-arch=compute_{OLDEST}", *flags, *folders, str(source), "-o", str(ptx_of(unit))]
+        )
+
+    def to_cubin(task: Tuple[Unit, int]) -> str:
+        ptx, architecture = ptx_of(task[0]), task[1]
+        cubin = ptx.with_name(f"{ptx.stem}-sm_{architecture}.cubin")
+        return _errors([_ptxas(found), f"-arch=sm_{architecture}", str(ptx), "-o", str(cubin)])
+
+    def wanted(unit: Unit) -> List[int]:
+        known: List[int] = table()["architectures"]
+        return known if everywhere or unit[1] == DEFAULT else [known[0], known[-1]]
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        failures = [text for text in pool.map(compile_unit, units()) if text]
+        failures = [text for text in pool.map(to_ptx, units()) if text]
+        if not failures:
+            tasks = [(unit, architecture) for unit in units() for architecture in wanted(unit)]
+            failures = [text for text in pool.map(to_cubin, tasks) if text]
     if failures:
         print("\n".join(failures)[:8000])
         raise BuildFailure(f"{len(failures)} kernels do not compile")
