@@ -7,7 +7,6 @@ source run by fibers on the CPU, which proves their logic and the Python around 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +16,12 @@ from luch.accel import Accel
 from luch.cuda import compiler, device
 from support import cuda_on_cpu
 from support.accel_meshes import HARD_MESHES, Mesh, aimed_rays, random_rays, rows, soup
+from support.cuda_on_cpu import FIBERS, GPU
 
 from buildtools.kernels import faults
 
 KINDS = list(compiler.table()["modules"])
 FEW = ("soup", "needles", "identical", "duplicates", "one triangle", "points")  # meshes for the fibers, which are slow
-FIBERS, GPU = "fibers", "cuda"
-
-
-@pytest.fixture(scope="module", params=[FIBERS, pytest.param(GPU, marks=pytest.mark.cuda)])
-def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where the kernels run."""
-    if request.param == GPU:
-        yield GPU
-        return
-    with cuda_on_cpu.standing_in(tmp_path_factory.mktemp("kernels")):
-        yield FIBERS
 
 
 def some_rays(mesh: Mesh, place: str) -> Any:

@@ -5,7 +5,6 @@ On fibers (tests/support/cuda_on_cpu.py) always; on a GPU with `-m cuda`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -16,25 +15,14 @@ from luch.cuda import render as device_render
 from luch.render import Progress, render
 from luch.scene import Camera, Film, Instances, Light, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder
-from support import cuda_on_cpu
+from support.cuda_on_cpu import FIBERS
 from support.effects import closure, principled, program
 
-FIBERS, GPU = "fibers", "cuda"
 LIGHT_PASSES = ["Emission", "Environment", "Ambient Occlusion", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color",
                 "Glossy Direct", "Glossy Indirect", "Glossy Color", "Transmission Direct", "Transmission Indirect",
                 "Transmission Color"]  # fmt: skip
 FIRST_PASSES = ["Depth", "Position", "Object Index", "Material Index"]
 DATA_PASSES = ["Mist", "Normal", "UV", "Denoising Albedo", "Denoising Normal", "CryptoObject00", "CryptoMaterial00"]
-
-
-@pytest.fixture(scope="module", params=[FIBERS, pytest.param(GPU, marks=pytest.mark.cuda)])
-def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where the kernels run."""
-    if request.param == GPU:
-        yield GPU
-        return
-    with cuda_on_cpu.standing_in(tmp_path_factory.mktemp("kernels")):
-        yield FIBERS
 
 
 def quad(name: str, half: float, z: float) -> Mesh:

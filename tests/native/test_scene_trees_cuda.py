@@ -6,20 +6,18 @@ source run by fibers on the CPU, which proves their logic and the Python around 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from luch.accel import STRUCTURES
 from luch.cuda.trace import SceneTracer, TreesTooDeep
-from support import cuda_on_cpu
 from support.accel_meshes import icosphere, random_rays, rows, soup
+from support.cuda_on_cpu import GPU
 from support.instances import ALL, Scene, crowd, placed
 
 from buildtools.kernels import faults, table
 
-FIBERS, GPU = "fibers", "cuda"
 FEW = (
     "BRUTE_FORCE",
     "BVH2",
@@ -27,16 +25,6 @@ FEW = (
     "KD_TREE",
 )  # for the fibers: the others' kernels are the same template, and slow to compile
 PRECISIONS = ("FAST", "WATERTIGHT", "DOUBLE")
-
-
-@pytest.fixture(scope="module", params=[FIBERS, pytest.param(GPU, marks=pytest.mark.cuda)])
-def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where the kernels run."""
-    if request.param == GPU:
-        yield GPU
-        return
-    with cuda_on_cpu.standing_in(tmp_path_factory.mktemp("kernels")):
-        yield FIBERS
 
 
 def check_equal(scene: Scene, rays: Any, kinds: Any, kind: str, flatten: int, precision: str = "WATERTIGHT") -> Any:

@@ -22,6 +22,7 @@ import pytest
 from luch.cuda import compiler, device
 
 HERE = Path(__file__).parent
+FIBERS, GPU = "fibers", "cuda"  # where a test's kernels run
 # A kernel whose parameters stand in its source: paths.cu, shadow.cuh.
 PLAIN_KERNEL = r'extern "C" __global__ void\s+(?:__launch_bounds__\([^)]*\)\s*)?(\w+)\(([^)]*RenderTask[^)]*)\)\s*{'
 FLAGS = ["-std=gnu++20", "-O1", "-march=x86-64-v3", "-ffp-contract=off", "-shared", "-fPIC", "-w"]

@@ -18,7 +18,7 @@ from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.trace import SceneTracer, TreesTooDeep
-from luch.cuda.upload import DeviceCopy
+from luch.cuda.upload import Blocks, DeviceCopy
 
 BLOCK = 128  # STAGE_BLOCK of render/stage.cuh
 # Paths under way at once. Fewer leave a large GPU idle in late bounces, more only cost memory.
@@ -105,6 +105,11 @@ class Memory:
         """Address of one of WaveCounter."""
         return int(self.counters.data.ptr) + 4 * COUNTERS.index(name)
 
+    def count(self, name: str) -> int:
+        """Of one of WaveCounter; waits for the device."""
+        index = COUNTERS.index(name)
+        return int(self.counters[index : index + 1].get()[0])
+
     @property
     def bytes(self) -> int:
         """All of it."""
@@ -147,13 +152,12 @@ class DeviceRenderer:
         began = time.perf_counter()
         precision = self._scene.settings.precision
         try:
-            self._upload()
+            facts, blocks = self._upload()
         except TreesTooDeep:
             self._host = core.render.Renderer(self._scene, True)
             if not self._host.prepare() or self._cancelled:
                 return False
-            self._upload()
-        facts, blocks = self._facts, self._blocks
+            facts, blocks = self._upload()
         self._upload_seconds = time.perf_counter() - began
         self._paths = load("RENDER_PATHS", precision)
         self._stages = SceneKernels(facts, blocks, self._scene)
@@ -162,13 +166,14 @@ class DeviceRenderer:
         self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]))
         return not self._cancelled
 
-    def _upload(self) -> None:
-        """The scene and its trees; large ones are built on the device."""
-        facts = self._facts = self._host.device_facts()
-        (self._blocks, links), (tree_blocks, tree_links), left, depth = self._host.device_images()
-        self._arrays = DeviceCopy(self._blocks, links)
+    def _upload(self) -> tuple[dict[str, Any], Blocks]:
+        """The scene and its trees; large ones are built on the device. What decides the scene's kernels."""
+        facts = self._host.device_facts()
+        (blocks, links), (tree_blocks, tree_links), left, depth = self._host.device_images()
+        self._arrays = DeviceCopy(blocks, links)
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
                                    facts["one_group"], left, depth)  # fmt: skip
+        return facts, blocks
 
     def _allocate(self, pixels: int, materials: int) -> Memory:
         """As large a wavefront as the device's memory allows, up to MOST_PATHS."""
@@ -221,7 +226,7 @@ class DeviceRenderer:
             self._counts["rays"] += rays
             self._counts["shadow_rays"] += shadows
             turn ^= 1
-            rays = int(memory.counters[:1].get()[0])
+            rays = memory.count("rays")
 
     def _trace_round(self, turn: int, rays: int) -> int:
         """One event of every path; returns how many shadow rays were cast."""
@@ -235,7 +240,7 @@ class DeviceRenderer:
         self._launch(paths.kernel("place_materials"), turn, 1)
         self._launch(paths.kernel("sort_hits"), turn, rays)
         self._launch(stages.kernel("shade_surfaces"), turn, rays)
-        shadows = int(memory.counters[2:3].get()[0])
+        shadows = memory.count("shadows")
         if shadows:
             self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"), memory.address("blocked"),
                              memory.counter("shadows"), memory.counter("shadowed"))  # fmt: skip
