@@ -36,7 +36,11 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
     accelerator: EnumProperty(
         name="Structure",
         items=[
-            ("AUTO", "Automatic", "Small scenes are tried out; from 20,000 triangles on, the BVH"),
+            (
+                "AUTO",
+                "Automatic",
+                "The fastest in trials on this scene; what would take long to build beside the render is not tried",
+            ),
             ("BVH", "BVH", "Bounding volume hierarchy, eight boxes a node: the fastest on nearly every scene"),
             ("BVH2", "Binary BVH", "Bounding volume hierarchy, two boxes a node"),
             ("BVH2_STACKLESS", "Stackless BVH", "Binary tree walked by skip pointers, always left to right"),

@@ -389,6 +389,8 @@ struct Reader {
         input.film.halves = py::cast<bool>(settings.attr("estimate_error"));
         input.accel = cpu::accel_request(py::cast<std::string>(settings.attr("accelerator")),
                                          py::cast<std::string>(settings.attr("precision")));
+        double time_limit_s = py::cast<double>(settings.attr("time_limit"));
+        if (time_limit_s > 0.0) input.accel.time_limit_s = time_limit_s;
     }
 };
 

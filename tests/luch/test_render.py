@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from luch._native import core
 from luch.accel import KINDS
 from luch.cuda import device
 from luch.render import Progress, render
@@ -57,7 +58,25 @@ def test_automatic_says_what_it_measured() -> None:
     assert re.search(r"\d million trial rays .* against .* \d", stats["accelerator_reason"])
     large = render(heavy_scene(20_000)).stats
     assert large["accelerator"] == "BVH"
-    assert "without a trial on this scene: from 20000 primitives" in large["accelerator_reason"]
+    assert re.search(
+        r"KD_TREE untried: building it takes 0.05\d? s a thread, tracing about 0.0", large["accelerator_reason"]
+    )
+
+
+def test_a_trial_is_made_where_it_is_cheap_beside_the_render() -> None:
+    def tried(samples: int, seconds: float) -> bool:
+        scene = heavy_scene(20_000)
+        scene.film.width = scene.film.height = 512
+        scene.settings.samples, scene.settings.time_limit = samples, seconds
+        renderer = core.render.Renderer(scene)
+        assert renderer.prepare()
+        reason = renderer.stats()["accelerator_reason"]
+        assert "million trial rays" in reason, "what the tree does here is measured in any case"
+        return "untried" not in reason
+
+    assert tried(10_000, 0.0)
+    assert not tried(10_000, 1.0), "a time limit bounds what there is to win"
+    assert not tried(1, 0.0)
 
 
 def test_an_unknown_structure_is_refused_by_name() -> None:

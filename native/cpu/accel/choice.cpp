@@ -27,12 +27,13 @@ constexpr Name NAMES[] = {
 };
 constexpr const char* PRECISIONS[] = {"FAST", "WATERTIGHT", "DOUBLE"};
 
-// AUTO tries a structure only where building it is cheap beside any render: the wide tree won every race over larger
-// scenes (docs/rays.md), so there the attempt would cost more than it could bring.
+// AUTO tries the eight-wide tree's challengers where they may win and the trial is cheap: brute force in the smallest
+// scenes, the kd-tree where building it takes little beside the rays that the render is expected to trace. What is
+// small is built in milliseconds and always tried.
 constexpr u64 TRY_BRUTE_FORCE_BELOW = 64;    // primitives
 constexpr u64 TRY_KD_TREE_BELOW = 20'000;
-constexpr const char* UNTRIED =
-    "BVH without a trial on this scene: from 20000 primitives on it won every race (docs/rays.md)";
+constexpr double KD_BUILD_US = 2.6;          // a primitive and thread (docs/rays.md)
+constexpr double TRIAL_SHARE = 0.01;         // of the expected tracing, for the trial
 constexpr u32 TRIAL_RAYS = 2048;
 // A challenger must win by this much: trials scatter by a few percent.
 constexpr double CLEAR_WIN = 1.1;
@@ -87,17 +88,57 @@ double measure(const Accel& accel, const std::vector<Ray>& rays) {
     return double(rays.size()) / std::max(best, 1e-9) * 1e-6;
 }
 
-u64 primitives_of(const SceneView& scene) {
+// Counted as often as instances let them stand.
+u64 standing_primitives(const SceneView& scene) {
     u64 count = 0;
     for (u32 i = 0; i < scene.instance_count; ++i) count += primitive_count(scene.meshes[scene.instances[i].mesh]);
     return count;
 }
 
-std::string sentence(const std::string& won, double rate, const std::string& others) {
-    char text[96];
-    std::snprintf(text, sizeof(text), "%s: %.2f million trial rays a second and thread", won.c_str(), rate);
-    return text + (others.empty() ? std::string() : ", against" + others);
+u64 distinct_primitives(const SceneView& scene) {
+    u64 count = 0;
+    for (u32 m = 0; m < scene.mesh_count; ++m) count += primitive_count(scene.meshes[m]);
+    return count;
 }
+
+std::string number(const char* format, double value) {
+    char text[64];
+    std::snprintf(text, sizeof(text), format, value);
+    return text;
+}
+
+// The structures that have raced so far: who leads, and what is said of the others.
+struct Race {
+    const SceneView& scene;
+    const std::vector<std::vector<u8>>& flags;
+    ThreadPool& pool;
+    ChosenAccel& leader;
+    std::vector<Ray> rays;
+    double rate;  // the leader's, Mrays/s and thread
+    std::string others;
+
+    void lost(const AccelChoice& choice, double its_rate) {
+        others += (others.empty() ? " " : ", ") + accel_name(choice) + number(" %.2f", its_rate);
+    }
+
+    void challenge(StructureKind kind) {
+        AccelChoice choice = leader.choice;
+        choice.wide = false;
+        choice.kind = kind;
+        std::unique_ptr<Accel> accel = Accel::build(scene, flags, pool, choice);
+        double its_rate = measure(*accel, rays);
+        if (its_rate <= CLEAR_WIN * rate) return lost(choice, its_rate);
+        lost(leader.choice, rate);
+        leader.accel = std::move(accel);
+        leader.choice = choice;
+        rate = its_rate;
+    }
+
+    std::string sentence() const {
+        return accel_name(leader.choice) + number(": %.2f million trial rays a second and thread", rate) +
+               (others.empty() ? "" : ", against" + others);
+    }
+};
 
 }  // namespace
 
@@ -132,42 +173,23 @@ ChosenAccel build_chosen(const SceneView& scene, const std::vector<std::vector<u
     ChosenAccel chosen;
     chosen.choice = request.choice;
     chosen.accel = Accel::build(scene, flags, pool, request.choice);
-    if (!request.automatic) {
-        chosen.reason = "chosen by the user";
-        return chosen;
-    }
-    u64 primitives = primitives_of(scene);
-    std::vector<StructureKind> challengers;
-    if (primitives < TRY_BRUTE_FORCE_BELOW) challengers.push_back(StructureKind::BRUTE_FORCE);
-    if (primitives < TRY_KD_TREE_BELOW) challengers.push_back(StructureKind::KD_TREE);
-    if (challengers.empty() || primitives == 0) {
-        chosen.reason = primitives ? UNTRIED : "nothing to hit";
-        return chosen;
-    }
+    u64 standing = standing_primitives(scene), distinct = distinct_primitives(scene);
+    chosen.reason = request.automatic ? "nothing to hit" : "chosen by the user";
+    if (!request.automatic || standing == 0) return chosen;
     std::vector<Ray> rays = trial_rays(scene);
-    double best = measure(*chosen.accel, rays);
-    std::string others;
-    auto lost = [&](const AccelChoice& choice, double rate) {
-        char text[64];
-        std::snprintf(text, sizeof(text), "%s %s %.2f", others.empty() ? "" : ",", accel_name(choice).c_str(), rate);
-        others += text;
-    };
-    for (StructureKind kind : challengers) {
-        AccelChoice choice = request.choice;
-        choice.wide = false;
-        choice.kind = kind;
-        std::unique_ptr<Accel> accel = Accel::build(scene, flags, pool, choice);
-        double rate = measure(*accel, rays);
-        if (rate > CLEAR_WIN * best) {
-            lost(chosen.choice, best);
-            chosen.accel = std::move(accel);
-            chosen.choice = choice;
-            best = rate;
-        } else {
-            lost(choice, rate);
-        }
+    double rate = measure(*chosen.accel, rays);
+    Race race{scene, flags, pool, chosen, std::move(rays), rate, {}};
+    if (standing < TRY_BRUTE_FORCE_BELOW) race.challenge(StructureKind::BRUTE_FORCE);
+    double build_s = 1e-6 * KD_BUILD_US * double(distinct);
+    double thread_s = 1e-6 * request.expected_rays / rate;  // as build_s: of one thread, shared alike by several
+    double trace_s = std::min(thread_s, request.time_limit_s * pool.size());
+    bool pays = build_s <= TRIAL_SHARE * trace_s;
+    if (standing < TRY_KD_TREE_BELOW || pays) race.challenge(StructureKind::KD_TREE);
+    chosen.reason = race.sentence();
+    if (standing >= TRY_KD_TREE_BELOW && !pays) {
+        chosen.reason += "; KD_TREE untried: building it takes" + number(" %.2g s a thread", build_s) +
+                         number(", tracing about %.2g", trace_s);
     }
-    chosen.reason = sentence(accel_name(chosen.choice), best, others);
     return chosen;
 }
 

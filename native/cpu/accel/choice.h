@@ -12,6 +12,9 @@ namespace luch::cpu {
 struct AccelRequest {
     bool automatic = true;
     AccelChoice choice;
+    // Of the whole render: what trying out another structure may cost depends on them.
+    double expected_rays = 0.0;
+    double time_limit_s = INFINITE_DISTANCE;
 };
 
 // Throws std::invalid_argument, naming those that exist.
