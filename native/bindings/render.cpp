@@ -8,6 +8,7 @@
 #include "bindings/bind.h"
 #include "bindings/device_image.h"
 #include "bindings/film.h"
+#include "bindings/forced.h"
 #include "bindings/scene_reader.h"
 #include "bindings/scene_trees.h"
 
@@ -176,6 +177,7 @@ void bind_render(py::module_& m) {
     auto render = m.def_submodule("render", "Rendering of a luch.scene.Scene on the CPU.");
     render.def("task_fields", &task_fields);
     render.def("task_sizes", &task_sizes);
+    render.def("forcible_effects", &forcible_effects);
     py::class_<PyRenderer>(render, "Renderer")
         .def(py::init<const py::object&, bool, std::optional<u64>>(), py::arg("scene"), py::arg("for_device") = false,
              py::arg("device_builds_from") = py::none(),

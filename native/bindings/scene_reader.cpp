@@ -6,6 +6,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "bindings/forced.h"
 #include "cpu/camera.h"
 #include "cpu/filter.h"
 
@@ -389,6 +390,8 @@ struct Reader {
         input.film.halves = py::cast<bool>(settings.attr("estimate_error"));
         input.accel = cpu::accel_request(py::cast<std::string>(settings.attr("accelerator")),
                                          py::cast<std::string>(settings.attr("precision")));
+        for (const auto& name : py::cast<std::vector<std::string>>(settings.attr("force_effects")))
+            force(input.forced, name);
         double time_limit_s = py::cast<double>(settings.attr("time_limit"));
         if (time_limit_s > 0.0) input.accel.time_limit_s = time_limit_s;
     }

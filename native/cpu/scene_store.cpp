@@ -266,7 +266,7 @@ const SceneView& SceneStore::finish() {
     return view_;
 }
 
-std::vector<std::vector<u8>> SceneStore::transparency_flags() const {
+std::vector<std::vector<u8>> SceneStore::transparency_flags(bool all) const {
     std::vector<std::vector<u8>> flags(meshes_.size());
     for (size_t o = 0; o < objects_.size(); o++) {
         const ObjectInput& object = object_inputs_[o];
@@ -274,7 +274,7 @@ std::vector<std::vector<u8>> SceneStore::transparency_flags() const {
         bool any = false;
         for (size_t slot = 0; slot < object.materials.size(); slot++) {
             const MaterialView& material = materials_.at(object.materials[slot]);
-            transparent[slot] = (material.program.flags & PROGRAM_TRANSPARENT) && material.transparent_shadows;
+            transparent[slot] = all || ((material.program.flags & PROGRAM_TRANSPARENT) && material.transparent_shadows);
             any = any || transparent[slot];
         }
         if (!any) continue;

@@ -80,7 +80,7 @@ class SceneStore {
 
     // Per mesh, per primitive: bit 0 set when some object that uses the mesh has a material there that may be
     // transparent for shadow rays. An empty inner vector: no primitive of that mesh.
-    std::vector<std::vector<u8>> transparency_flags() const;
+    std::vector<std::vector<u8>> transparency_flags(bool all = false) const;
 
     // Adds the arrays behind `view`, a copy of view() inside the image's block `block`.
     void describe(DeviceImage& image, u32 block, const SceneView& view) const;

@@ -52,6 +52,15 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument(
         "--device", type=str.upper, choices=("CPU", "CUDA"), help="what computes (default: the scene's)"
     )
+    render.add_argument(
+        "--without-effect", action="append", metavar="NAME", help="leave out an effect that `info` lists"
+    )
+    render.add_argument(
+        "--force-effect",
+        action="append",
+        metavar="NAME",
+        help="simulate an effect that the scene lacks; ALL: every one",
+    )
     render.add_argument("--threads", type=int, help="0: one per processor")
     render.add_argument("--quiet", action="store_true", help="no progress on stderr")
     render.set_defaults(run=_render)
@@ -129,6 +138,10 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
         settings.device = options.device
     if options.threads is not None:
         settings.threads = options.threads
+    if options.without_effect:
+        settings.without_effects = options.without_effect
+    if options.force_effect:
+        settings.force_effects = options.force_effect
 
 
 def _statistics(result: Result) -> dict[str, str | int | float]:

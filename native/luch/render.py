@@ -20,6 +20,7 @@ import numpy as np
 from luch import accuracy
 from luch._native import core
 from luch.effects import effects_of
+from luch.effects.removal import without
 from luch.scene import F32, Film, Scene
 
 # A step is watched this often: what a cancel waits for at most, beside one batch of paths.
@@ -161,12 +162,13 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     fit together, naming the object.
     """
     start = time.perf_counter()
+    effects = effects_of(scene).as_dict()
+    scene = without(scene, scene.settings.without_effects)
     wants_error = ERROR_PASS in scene.film.passes and ERROR_PASS not in (name for name, _ in scene.film.aovs)
     settings = replace(scene.settings, estimate_error=scene.settings.estimate_error or wants_error)
     film = replace(scene.film, passes=[name for name in scene.film.passes if name != ERROR_PASS])
     traced = replace(scene, film=film, settings=settings)
     renderer, warnings = _renderer_for(traced)
-    effects = effects_of(scene).as_dict()
     total = max(1, settings.samples)
     cancelled = not _watched(renderer.prepare, renderer, lambda: progress is None or progress(_preparing(total, start)))
     prepared = time.perf_counter()

@@ -225,7 +225,10 @@ class Settings:
     precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
     integrator: str = "PATH"
     device: str = "CPU"  # or "CUDA"
-    compile_only_needed: bool = True  # CUDA: kernels hold no code for what the scene lacks; False: all, to compare
+    # To see what an effect (luch.effects) costs: left out of the picture; simulated though the scene lacks it. ["ALL"]
+    # forces every effect that can be.
+    without_effects: list[str] = field(default_factory=list)
+    force_effects: list[str] = field(default_factory=list)
     estimate_error: bool = True  # two independent sequences a pixel, whose difference tells the picture's error
     ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
 

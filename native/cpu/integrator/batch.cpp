@@ -93,7 +93,7 @@ void Batch::generate_pixel(const PixelSequences& pixel, u32 px, u32 py, u32 firs
         Vec2 u = sample_2d(make_sampler(pixel, first_sample + i), 0);
         filter_u[0][i] = u.x, filter_u[1][i] = u.y;
     }
-    for (u32 i = 0; i < count && has_lens(scene_); i++) {
+    for (u32 i = 0; i < count && scene_.has_lens; i++) {
         Vec2 u = sample_2d(make_sampler(pixel, first_sample + i), 1);
         lens_u[0][i] = u.x, lens_u[1][i] = u.y;
         counts_.lens_samples++;

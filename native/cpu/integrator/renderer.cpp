@@ -70,6 +70,7 @@ void Renderer::build_all() {
     scene_.seed = input_.seed;
     scene_.log2_samples = ceil_log2(input_.samples);
     scene_.halves = input_.film.halves;
+    scene_.has_lens = input_.camera.aperture_radius > 0.0f || input_.forced.lens;
     scene_.mist_start = input_.mist_start;
     scene_.mist_inverse_depth = input_.mist_depth > 0.0f ? 1.0f / input_.mist_depth : 0.0f;
     scene_.mist_exponent = input_.mist_exponent;
@@ -87,7 +88,8 @@ Renderer::~Renderer() = default;
 void Renderer::build_accel() {
     AccelRequest request = input_.accel;
     request.expected_rays = double(film_.view().width) * film_.view().height * input_.samples * EXPECTED_RAYS;
-    ChosenAccel chosen = build_chosen(scene_.view, store_->transparency_flags(), pool_, request);
+    ChosenAccel chosen =
+        build_chosen(scene_.view, store_->transparency_flags(input_.forced.transparency), pool_, request);
     accel_ = std::move(chosen.accel);
     stats_.accel_name = accel_name(chosen.choice);
     stats_.accel_reason = chosen.reason;
@@ -98,7 +100,7 @@ void Renderer::build_accel() {
 void Renderer::build_device_trees() {
     AccelChoice choice = input_.accel.choice;
     choice.leave_from = input_.device_builds_from;
-    trees_ = SceneTrees::build(scene_.view, store_->transparency_flags(), pool_, choice);
+    trees_ = SceneTrees::build(scene_.view, store_->transparency_flags(input_.forced.transparency), pool_, choice);
     stats_.accel_name = input_.accel.choice.wide ? "CWBVH" : accel_name(input_.accel.choice);
     stats_.accel_reason = input_.accel.automatic ? "on CUDA the compressed wide tree is the fastest in all measured "
                                                    "scenes (docs/rays.md)"
@@ -136,6 +138,7 @@ void Renderer::find_constants() {
         ConstantEmission emission{};
         emission.constant = !(program.flags & PROGRAM_EMISSION) || (program.flags & PROGRAM_CONSTANT_EMISSION);
         if (program.flags & PROGRAM_CONSTANT_EMISSION) emission.radiance = evaluate_emission(view, program, points);
+        if (input_.forced.emission) emission.constant = false;
         scene_.emission_of_materials.push_back(emission);
     }
     scene_.material_emission = scene_.emission_of_materials.data();
@@ -223,8 +226,9 @@ void Renderer::build_lights() {
     store_->view().lights = scene_.view.lights = &lights_.view();
     const LightsView& lights = lights_.view();
     scene_.has_lights = lights.emitter_count > 0 || lights.sun_count > 0 || lights.world.present;
-    scene_.has_visible_lamps = lights.box_count > 0;
-    scene_.can_meet_light = scene_.has_world || scene_.has_visible_lamps;
+    scene_.has_visible_lamps = lights.box_count > 0 || input_.forced.lamps;
+    scene_.can_meet_light = scene_.has_world || scene_.has_visible_lamps || input_.forced.emission;
+    if (input_.forced.world) scene_.world_emission.constant = false;  // after all that chooses by it
     for (u32 sun = 0; sun < lights.sun_count; sun++) {
         if (!lights.lamps[lights.suns[sun]].delta) scene_.can_meet_light = true;
     }

@@ -19,6 +19,15 @@
 
 namespace luch::cpu {
 
+// What is done though the scene does not call for it: to see what it would cost. No bit of the picture changes.
+struct ForcedWork {
+    bool lens = false;          // every path chooses a point of the aperture
+    bool lamps = false;         // every ray looks for lamps, and every last bounce is followed
+    bool transparency = false;  // every surface may let shadow rays through: its program decides
+    bool world = false;         // the world's program runs for every ray that leaves
+    bool emission = false;      // every surface may shine: its program decides
+};
+
 // What the renderer is made from, beside the SceneStore.
 struct RenderInput {
     std::vector<LampInput> lamps;
@@ -36,6 +45,7 @@ struct RenderInput {
     FilmSpec film;
     u32 seed = 0, samples = 1;
     unsigned threads = 0;
+    ForcedWork forced;
     float mist_start = 0.0f, mist_depth = 25.0f, mist_exponent = 2.0f;
     double origin[3] = {0.0, 0.0, 0.0};
 };

@@ -28,7 +28,7 @@ extern "C" __global__ void begin_paths(const __grid_constant__ luch::RenderTask 
     film_count_samples(writer, pixel, 1u, other_half_samples(task.scene, sample, 1u));
     Sampler sampler =
         make_sampler(make_pixel_sequences(px, py, task.scene.seed, task.scene.log2_samples, task.scene.halves), sample);
-    Vec2 lens_u = has_lens(task.scene) ? sample_2d(sampler, 1) : Vec2{0.5f, 0.5f};
+    Vec2 lens_u = task.scene.has_lens ? sample_2d(sampler, 1) : Vec2{0.5f, 0.5f};
     PathState path;
     task.wave.rays[i] = begin_path(task.scene, task.film, px, py, sample, sampler, sample_2d(sampler, 0), lens_u, path);
     task.wave.ray_slot[i] = slot;

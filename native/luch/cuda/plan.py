@@ -5,7 +5,10 @@ The rule is one-sided: code is left out only where no effect that needs it is on
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from luch.effects import Effects
+from luch.effects.forcing import ALL
 
 # Define -> effects that need it, by their names in luch.effects; a name that ends in * stands for all that begin so.
 NEEDED_BY: dict[str, tuple[str, ...]] = {
@@ -37,8 +40,10 @@ MADE_BY: dict[str, tuple[str, ...]] = {
 }
 
 
-def plan_of(effects: Effects, operations: set[str]) -> dict[str, bool]:
-    """Which code a scene needs. operations: names of those that its programs hold."""
+def plan_of(effects: Effects, operations: set[str], forced: Iterable[str] = ()) -> dict[str, bool]:
+    """Which code a scene needs. operations: names of those that its programs hold. forced: Settings.force_effects."""
+    if ALL in forced:
+        return dict.fromkeys([*NEEDED_BY, *MADE_BY], True)
     plan = {define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()}
     plan |= {define: any(name in operations for name in names) for define, names in MADE_BY.items()}
     return plan

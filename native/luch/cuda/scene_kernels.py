@@ -36,9 +36,9 @@ class SceneKernels:
             f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
             f"-DLUCH_STRUCTURE={structure}",
         ]
-        self.plan = plans.plan_of(effects_of(scene), operations(programs, instructions))
-        if scene.settings.compile_only_needed:
-            self._flags += plans.flags(self.plan)
+        forced = scene.settings.force_effects
+        self.plan = plans.plan_of(effects_of(scene), operations(programs, instructions), forced)
+        self._flags += plans.flags(self.plan)
         self._precision = precision
         self._module: Module | None = None
         self._ready: bytes | None = None

@@ -12,8 +12,12 @@ Surfaces
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from luch.effects.forcing import check, force
 from luch.effects.lights import add_lights
 from luch.effects.picture import add_camera, add_film, add_geometry, add_later, add_paths
+from luch.effects.removal import without
 from luch.effects.shown import look_at
 from luch.effects.surfaces import add_surfaces, add_textures
 from luch.effects.table import Effect, Effects, summary
@@ -25,9 +29,27 @@ __all__ = ["Effect", "Effects", "effects_of", "summary"]
 def effects_of(scene: Scene) -> Effects:
     """The effects of a scene: what is on, what is off, what it asks for in vain.
 
-    Programs are followed from their closures, so that what changes nothing is not on. Raises ValueError if a
-    program is damaged.
+    Programs are followed from their closures, so that what changes nothing is not on. What the settings leave out or
+    force is told so. Raises ValueError if a program is damaged, or for a name that cannot be left out or forced.
     """
+    forced, left_out = scene.settings.force_effects, scene.settings.without_effects
+    check(forced)
+    effects = _found(without(scene, left_out))
+    if left_out:
+        wanted = _found(scene)
+        for name in left_out:
+            _tell_left_out(effects, name, wanted)
+    force(effects, forced)
+    return effects
+
+
+def _tell_left_out(effects: Effects, name: str, wanted: Effects) -> None:
+    if name in wanted and wanted[name].on:
+        reason = f"left out on request: {wanted[name].reason}"
+        effects.table[name] = replace(wanted[name], on=False, reason=reason, cost="")
+
+
+def _found(scene: Scene) -> Effects:
     effects, shown = Effects(), look_at(scene)
     add_surfaces(effects, shown)
     add_textures(effects, shown)

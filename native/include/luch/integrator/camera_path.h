@@ -4,8 +4,6 @@
 
 namespace luch {
 
-LUCH_FN bool has_lens(const RenderView& scene) { return scene.camera.aperture_radius > 0.0f; }
-
 // Row of the film for a pixel of the full frame.
 LUCH_FN u32 film_pixel(const FilmView& film, u32 x, u32 y) { return (y - film.y0) * film.width + (x - film.x0); }
 
@@ -15,7 +13,7 @@ LUCH_FN Ray begin_path(const RenderView& scene, const FilmView& film, u32 px, u3
     Vec2 offset = sample_filter(*scene.filter, filter_u);
     CameraRay camera =
         generate_ray(scene.camera, {static_cast<float>(px) + 0.5f + offset.x, static_cast<float>(py) + 0.5f + offset.y},
-                     has_lens(scene) ? lens_u : Vec2{0.5f, 0.5f});
+                     scene.has_lens ? lens_u : Vec2{0.5f, 0.5f});
     path = PathState{};
     path.sampler = sampler;
     path.sample = sample;
