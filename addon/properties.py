@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 
 def _bounces(name: str, default: int, what: str) -> bpy.props._PropertyDeferred:
@@ -66,6 +66,14 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         name="Estimate Error",
         default=True,
         description="Keep two halves of the samples apart, so that the render knows its error with an interval",
+    )
+    without_effects: StringProperty(
+        name="Effects Left Out", default="", description="Names from the list of effects, with semicolons between them"
+    )
+    force_effects: BoolProperty(
+        name="Simulate Absent Effects",
+        default=False,
+        description="Do the work of effects that the scene lacks: the picture stays the same, the time shows their cost",
     )
     threads: IntProperty(name="Threads", default=0, min=0, max=1024, description="Threads to use; 0 for all")
     samples: IntProperty(name="Max Samples", default=128, min=1, max=1 << 24, description="Paths through every pixel")

@@ -51,3 +51,8 @@ def effective(scene: Any, name: str) -> Any:
     """The value a render uses. Unset in both engines, Luch's default holds: it never darkens the light (no clamping)."""
     owner: Any = scene.cycles if follows_cycles(scene, name) else scene.luch
     return getattr(owner, name)
+
+
+def names_of(text: str) -> list[str]:
+    """Names with semicolons between them, as a property keeps a list."""
+    return [name.strip() for name in text.split(";") if name.strip()]

@@ -9,7 +9,7 @@ import numpy as np
 from luch.scene import Settings
 
 from .. import command_line
-from ..settings import effective
+from ..settings import effective, names_of
 from .context import ExportContext
 
 SAME_NAME = (
@@ -42,6 +42,8 @@ def export_settings(context: ExportContext) -> Settings:
         precision=scene.luch.precision,
         device=scene.luch.device,
         estimate_error=scene.luch.estimate_error,
+        without_effects=names_of(scene.luch.without_effects),
+        force_effects=["ALL"] if scene.luch.force_effects else [],
         **{name: effective(scene, name) for name in SAME_NAME},
     )
     if context.view_layer.samples > 0:

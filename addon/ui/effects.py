@@ -9,9 +9,10 @@ from typing import Any
 import bpy
 
 from .. import engine
+from ..settings import names_of
 from .panels import LuchPanel
 
-ICONS = {"on": "CHECKMARK", "not yet": "ERROR", "off": "DOT"}
+ICONS = {"on": "CHECKMARK", "not yet": "ERROR", "off": "DOT", "left out": "CANCEL"}
 _LETTER_PIXELS = 8.0  # at 100 % of Blender's resolution scale
 _LEAST_LETTERS = 24
 _INDENT = "    "
@@ -25,22 +26,35 @@ def rows_of_last_render(scene: Any) -> list[Row]:
 
 
 def state(row: dict[str, Any]) -> str:
-    """ "on", "not yet" (the scene asks for it in vain) or "off"."""
-    return "not yet" if row.get("missing") else "on" if row["on"] else "off"
+    """ "on", "not yet" (the scene asks for it in vain), "left out" (by the user) or "off"."""
+    return "not yet" if row.get("missing") else "left out" if row.get("left_out") else "on" if row["on"] else "off"
 
 
-def draw_rows(layout: Any, rows: Iterable[Row], letters: int) -> None:
-    """Name with its icon, then the reason, wrapped: labels would cut it."""
+def draw_rows(layout: Any, rows: Iterable[Row], letters: int, left_out: Iterable[str] = ()) -> None:
+    """Name with its icon, then the reason, wrapped: labels would cut it. left_out: by the next render."""
     column = layout.column(align=True)
     group = ""
     for name, row in rows:
         if row["group"] != group:
             group = row["group"]
             column.label(text=group)
-        column.label(text=name, icon=ICONS[state(row)])
+        line = column.row()
+        line.label(text=name, icon=ICONS[state(row)])
+        if state(row) in ("on", "left out") and instead(name):
+            gone = name in left_out
+            line.operator(
+                "luch.leave_out_effect", text="", icon="HIDE_ON" if gone else "HIDE_OFF", emboss=gone
+            ).effect = name
         cost = f" ({row['cost']})" if row.get("cost") else ""
         for line in textwrap.wrap(row["reason"] + cost, letters):
             column.label(text=_INDENT + line)
+
+
+def instead(name: str) -> str:
+    """What is drawn where an effect is left out; "" for one that cannot be."""
+    from luch.effects.removal import REMOVALS  # loads the core: not while Blender starts
+
+    return REMOVALS[name].instead if name in REMOVALS else ""
 
 
 def letters_across(context: Any) -> int:
@@ -60,9 +74,34 @@ class LUCH_RENDER_PT_effects(LuchPanel, bpy.types.Panel):
     def draw(self, context: Any) -> None:
         rows = [(name, row) for name, row in rows_of_last_render(context.scene) if state(row) != "off"]
         if rows:
-            draw_rows(self.layout, rows, letters_across(context))
+            draw_rows(self.layout, rows, letters_across(context), names_of(context.scene.luch.without_effects))
         else:
             self.layout.label(text="Known after the first render")
+        self.layout.prop(context.scene.luch, "force_effects")
+
+
+class LUCH_OT_leave_out_effect(bpy.types.Operator):
+    """Leave this effect out of the next render, or take it in again"""
+
+    bl_idname = "luch.leave_out_effect"
+    bl_label = "Leave Out Effect"
+    bl_options = {"REGISTER", "UNDO"}
+
+    effect: bpy.props.StringProperty()
+
+    @classmethod
+    def description(cls, context: Any, properties: Any) -> str:
+        """What is drawn instead."""
+        return f"Leave this effect out of the next render, or take it in again. Instead: {instead(properties.effect)}"
+
+    def execute(self, context: Any) -> set[str]:
+        if not instead(self.effect):
+            self.report({"ERROR"}, f'The effect "{self.effect}" cannot be left out.')
+            return {"CANCELLED"}
+        names = names_of(context.scene.luch.without_effects)
+        left = [name for name in names if name != self.effect]
+        context.scene.luch.without_effects = "; ".join(left if self.effect in names else [*names, self.effect])
+        return {"FINISHED"}
 
 
 class LUCH_RENDER_PT_effects_off(LuchPanel, bpy.types.Panel):
@@ -81,6 +120,6 @@ class LUCH_RENDER_PT_effects_off(LuchPanel, bpy.types.Panel):
         draw_rows(self.layout, rows, letters_across(context))
 
 
-CLASSES = (LUCH_RENDER_PT_effects, LUCH_RENDER_PT_effects_off)
+CLASSES = (LUCH_OT_leave_out_effect, LUCH_RENDER_PT_effects, LUCH_RENDER_PT_effects_off)
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

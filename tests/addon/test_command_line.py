@@ -20,3 +20,11 @@ def test_the_device_is_named_in_either_case() -> None:
 def test_a_misspelt_option_is_told(words: tuple[str, ...]) -> None:
     with pytest.raises(CommandLineError, match=r"--luch-device CPU\|CUDA"):
         overrides(("blender", "--", *words))
+
+
+def test_effects_are_left_out_and_forced_by_name() -> None:
+    words = ("--luch-without-effect", "coat", "--luch-without-effect", "depth of field", "--luch-force-effect", "ALL")
+    assert overrides(("blender", "--", *words)) == {
+        "without_effects": ["coat", "depth of field"],
+        "force_effects": ["ALL"],
+    }

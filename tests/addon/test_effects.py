@@ -154,3 +154,22 @@ def test_world_and_lamps_are_told_as_they_are_built(room: bpy.types.Scene) -> No
     tree.links.new(sky.outputs["Color"], tree.nodes["Background"].inputs["Color"])
     found = exported(room)
     assert found["sky"].on and not found["environment image"].on
+
+
+def test_an_effect_is_left_out_at_a_press_and_taken_in_again(room: bpy.types.Scene) -> None:
+    surface(room).inputs["Coat Weight"].default_value = 0.5
+    for name in ("coat", "sheen"):
+        assert bpy.ops.luch.leave_out_effect(effect=name) == {"FINISHED"}
+    assert room.luch.without_effects == "coat; sheen"
+    assert exported(room)["coat"].state == "left out"
+    bpy.ops.luch.leave_out_effect(effect="coat")
+    assert room.luch.without_effects == "sheen"
+    assert exported(room)["coat"].on
+    with pytest.raises(RuntimeError, match='"fog" cannot be left out'):
+        bpy.ops.luch.leave_out_effect(effect="fog")
+
+
+def test_absent_effects_are_simulated_on_request(room: bpy.types.Scene) -> None:
+    assert not exported(room)["depth of field"].on
+    room.luch.force_effects = True
+    assert exported(room)["depth of field"].on

@@ -26,9 +26,10 @@ class Layout:
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.drawn.append(text)
 
-    def operator(self, identifier: str, **options: object) -> None:
+    def operator(self, identifier: str, **options: object) -> SimpleNamespace:
         module, name = identifier.split(".")
         assert getattr(getattr(bpy.ops, module), name).get_rna_type() is not None
+        return SimpleNamespace()
 
     def row(self, **options: object) -> Layout:
         return self
@@ -96,18 +97,21 @@ def test_effects_of_the_last_render_are_listed_with_their_reasons(
 ) -> None:
     context = {"region": SimpleNamespace(width=400), "preferences": bpy.context.preferences}
     monkeypatch.setattr(engine, "last_stats", {})
-    assert draw(effects.LUCH_RENDER_PT_effects, scene, **context) == ["Known after the first render"]
+    assert draw(effects.LUCH_RENDER_PT_effects, scene, **context) == ["Known after the first render", "force_effects"]
     off = SimpleNamespace(scene=scene, engine="LUCH")
     assert not effects.LUCH_RENDER_PT_effects_off.poll(off)
     rows = {
         "coat": {"on": True, "reason": "a coat " * 20, "group": "Surfaces", "cost": "a lobe"},
         "volumes": {"on": False, "reason": "left out", "group": "Geometry", "missing": True},
         "sheen": {"on": False, "reason": "every sheen weight is 0", "group": "Surfaces"},
+        "bump": {"on": False, "left_out": True, "reason": "material", "group": "Surfaces"},
     }
     monkeypatch.setattr(engine, "last_stats", {scene.name: {"effects": rows}})
     shown = draw(effects.LUCH_RENDER_PT_effects, scene, **context)
-    assert [text for text in shown if not text.startswith(" ")] == ["Surfaces", "coat", "Geometry", "volumes"]
-    assert "(a lobe)" in shown[-4] and max(map(len, shown)) <= 400 / 8 + 4
+    assert [text for text in shown if not text.startswith(" ")] == [
+        "Surfaces", "coat", "Geometry", "volumes", "Surfaces", "bump", "force_effects"
+    ]  # fmt: skip
+    assert "(a lobe)" in "".join(shown) and max(map(len, shown)) <= 400 / 8 + 4
     hidden = draw(effects.LUCH_RENDER_PT_effects_off, scene, **context)
     assert hidden == ["Surfaces", "sheen", "    every sheen weight is 0"]
 

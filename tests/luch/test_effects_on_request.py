@@ -52,7 +52,8 @@ def test_a_layer_that_is_left_out_is_gone_and_told(name: str) -> None:
     assert effects_of(subject)[name].on
     effects = effects_of(asking(subject, without_effects=[name]))
     assert not effects[name].on
-    assert effects[name].reason.startswith("left out on request: ")
+    assert effects[name].state == "left out"
+    assert effects[name].reason == effects_of(subject)[name].reason, "what asks for it is still told"
     others = [other for other in effects_of(subject).names(on=True) if other != name]
     gone = [other for other in others if not effects[other].on]
     assert all("bounces" in other or "transparen" in other or "caustics" in other for other in gone), gone

@@ -45,8 +45,7 @@ def effects_of(scene: Scene) -> Effects:
 
 def _tell_left_out(effects: Effects, name: str, wanted: Effects) -> None:
     if name in wanted and wanted[name].on:
-        reason = f"left out on request: {wanted[name].reason}"
-        effects.table[name] = replace(wanted[name], on=False, reason=reason, cost="")
+        effects.table[name] = replace(wanted[name], on=False, left_out=True, cost="")
 
 
 def _found(scene: Scene) -> Effects:

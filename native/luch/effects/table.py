@@ -20,11 +20,12 @@ class Effect:
     cost: str = ""  # what it takes, or what its absence saves, where that is known
     missing: bool = False  # the scene asks for it and Luch cannot do it yet
     group: str = GROUPS[0]
+    left_out: bool = False  # the scene needs it, the user does without
 
     @property
     def state(self) -> str:
-        """ "on", "off" or "not yet"."""
-        return "not yet" if self.missing else "on" if self.on else "off"
+        """ "on", "off", "not yet" or "left out"."""
+        return "not yet" if self.missing else "left out" if self.left_out else "on" if self.on else "off"
 
 
 @dataclass
@@ -51,7 +52,7 @@ class Effects:
         return [name for name, effect in self.table.items() if effect.on == on]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
-        """Fit for JSON: name -> on, reason, group; cost where known; missing where it is true."""
+        """Fit for JSON: name -> on, reason, group; cost where known; missing, left_out where true."""
         result: dict[str, dict[str, Any]] = {}
         for name, effect in self.table.items():
             row: dict[str, Any] = {"on": effect.on, "reason": effect.reason, "group": effect.group}
@@ -59,6 +60,8 @@ class Effects:
                 row["cost"] = effect.cost
             if effect.missing:
                 row["missing"] = True
+            if effect.left_out:
+                row["left_out"] = True
             result[name] = row
         return result
 
@@ -81,7 +84,7 @@ def summary(effects: Mapping[str, Mapping[str, Any]]) -> str:
 def _rows(rows: list[tuple[str, Effect]]) -> list[str]:
     """A group's lines: what is on, what is missing, what is off; those that are off for one reason share a line."""
     lines: list[str] = []
-    for state in ("on", "not yet"):
+    for state in ("on", "left out", "not yet"):
         for name, effect in rows:
             if effect.state == state:
                 cost = f" ({effect.cost})" if effect.cost else ""
