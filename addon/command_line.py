@@ -21,7 +21,7 @@ class _Parser(argparse.ArgumentParser):
         raise CommandLineError(f"Command line: {message}. Luch knows {', '.join(OPTIONS)}.")
 
 
-OPTIONS = ("--luch-device CPU|CUDA", "--luch-without-effect NAME", "--luch-force-effect NAME|ALL")
+OPTIONS = ("--luch-device CPU|CUDA", "--luch-gpus N", "--luch-without-effect NAME", "--luch-force-effect NAME|ALL")
 
 
 @functools.cache
@@ -32,6 +32,7 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     own = list(words[words.index("--") + 1 :])
     parser = _Parser(add_help=False, allow_abbrev=False)
     parser.add_argument("--luch-device", choices=("CPU", "CUDA"), type=str.upper)
+    parser.add_argument("--luch-gpus", type=int)
     parser.add_argument("--luch-without-effect", action="append", dest="luch_without_effects")
     parser.add_argument("--luch-force-effect", action="append", dest="luch_force_effects")
     found, rest = parser.parse_known_args(own)

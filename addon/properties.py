@@ -33,6 +33,9 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         default="CPU",
         description="What computes",
     )
+    gpus: IntProperty(
+        name="GPUs", default=0, min=0, max=64, description="How many GPUs share the samples; 0 for all that there are"
+    )
     accelerator: EnumProperty(
         name="Structure",
         items=[

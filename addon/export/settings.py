@@ -41,6 +41,7 @@ def export_settings(context: ExportContext) -> Settings:
         accelerator=scene.luch.accelerator,
         precision=scene.luch.precision,
         device=scene.luch.device,
+        gpus=scene.luch.gpus,
         estimate_error=scene.luch.estimate_error,
         without_effects=names_of(scene.luch.without_effects),
         force_effects=["ALL"] if scene.luch.force_effects else [],

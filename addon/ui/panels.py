@@ -121,7 +121,15 @@ class LUCH_RENDER_PT_performance(LuchPanel, bpy.types.Panel):
 
     def draw(self, context: Any) -> None:
         scene = context.scene
-        draw_settings(self.layout, scene, "device", "accelerator", "precision", "threads")
+        draw_settings(
+            self.layout,
+            scene,
+            "device",
+            *(("gpus",) if scene.luch.device == "CUDA" else ()),
+            "accelerator",
+            "precision",
+            "threads",
+        )
         self.layout.prop(scene.render, "use_persistent_data")
 
 

@@ -61,6 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="simulate an effect that the scene lacks; ALL: every one",
     )
+    render.add_argument("--gpus", type=_positive(int), help="how many GPUs share the samples (default: all)")
     render.add_argument("--threads", type=int, help="0: one per processor")
     render.add_argument("--quiet", action="store_true", help="no progress on stderr")
     render.set_defaults(run=_render)
@@ -138,6 +139,8 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
         settings.device = options.device
     if options.threads is not None:
         settings.threads = options.threads
+    if options.gpus is not None:
+        settings.gpus = options.gpus
     if options.without_effect:
         settings.without_effects = options.without_effect
     if options.force_effect:

@@ -146,10 +146,10 @@ def _renderer_for(scene: Scene) -> tuple[Any, list[str]]:
     if scene.settings.device != "CUDA":
         raise ValueError(f"Settings: device is {scene.settings.device!r}; it can be CPU or CUDA.")
     from luch.cuda import DeviceError
-    from luch.cuda.render import DeviceRenderer
+    from luch.cuda.several import renderer_for
 
     try:
-        return DeviceRenderer(scene), []
+        return renderer_for(scene), []
     except DeviceError as error:
         return core.render.Renderer(scene), [f"Rendered on the CPU: {error}"]
 
@@ -247,7 +247,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         peak_memory_bytes=peak_memory_bytes(),
         cancelled=cancelled,
         stopped_by="cancel" if cancelled else "time" if timed_out else "samples",
-        warnings=[*scene.warnings, *warnings],
+        warnings=[*scene.warnings, *warnings, *getattr(renderer, "warnings", [])],
         effects=effects,
     )
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}

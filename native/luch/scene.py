@@ -225,6 +225,7 @@ class Settings:
     precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
     integrator: str = "PATH"
     device: str = "CPU"  # or "CUDA"
+    gpus: int = 0  # how many of the CUDA devices that are visible, 0: all
     # To see what an effect (luch.effects) costs: left out of the picture; simulated though the scene lacks it. ["ALL"]
     # forces every effect that can be.
     without_effects: list[str] = field(default_factory=list)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from luch.cuda import device
 from luch.cuda import render as device_render
+from luch.cuda.several import shares
 from luch.render import Progress, render
 from luch.scene import Instances, Material, Scene
 from luch.shader import ProgramBuilder
@@ -118,3 +119,57 @@ def test_too_little_memory_is_told_with_its_remedy(place: str, monkeypatch: pyte
     monkeypatch.setattr(device_render, "MEMORY_SHARE", 1e-9)
     with pytest.raises(device.DeviceError, match=r"GiB free; the film of this picture and .* paths need more"):
         render(scene)
+
+
+@pytest.fixture
+def two_gpus(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    runtime = device.cupy().cuda.runtime
+    if place == FIBERS:
+        monkeypatch.setattr(runtime, "getDeviceCount", lambda: 2)
+    elif runtime.getDeviceCount() < 2:
+        pytest.skip("there is one GPU")
+
+
+def test_two_gpus_share_the_samples_and_the_picture_is_the_same(place: str, two_gpus: None) -> None:
+    passes = ["Combined", *FIRST_PASSES, *LIGHT_PASSES]
+    scene = everything(device="CUDA", estimate_error=True)
+    scene.film.passes, scene.settings.samples = passes, 7
+    one, two = (render(replace(scene, settings=replace(scene.settings, gpus=count))) for count in (1, 0))
+    assert two.stats["device"].startswith("CUDA: 2 x ")
+    assert len(two.stats["samples_per_second_of_gpus"]) == 2
+    for name in passes:
+        np.testing.assert_allclose(two.passes[name], one.passes[name], rtol=1e-6, atol=1e-7, err_msg=name)
+    assert two.stats["error"] == pytest.approx(one.stats["error"], rel=1e-6)
+    for name in ("paths", "rays", "shadow_rays", "surface_points", "samples"):
+        assert two.stats[name] == one.stats[name], name
+
+
+def test_a_gpu_without_memory_is_left_out_and_named(
+    place: str, two_gpus: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    allocate = device_render.DeviceRenderer._allocate
+
+    def full(self: device_render.DeviceRenderer, pixels: int, materials: int) -> Any:
+        if device.cupy().cuda.Device().id == 1:
+            raise device.DeviceError("The GPU has 0 GiB free.")
+        return allocate(self, pixels, materials)
+
+    monkeypatch.setattr(device_render.DeviceRenderer, "_allocate", full)
+    scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
+    result = render(scene)
+    assert result.stats["device"].startswith("CUDA: 1 x ")
+    assert result.stats["warnings"] == ["One GPU of 2 is left out: The GPU has 0 GiB free."]
+    assert result.stats["samples"] == scene.settings.samples
+
+
+def test_a_cancel_stops_every_gpu(place: str, two_gpus: None) -> None:
+    scene = replace(plain(), settings=replace(plain().settings, device="CUDA", samples=1 << 14))
+    result = render(scene, progress=lambda progress: progress.samples == 0)
+    assert result.cancelled
+    assert 1 <= result.stats["samples"] < 1 << 14
+
+
+@pytest.mark.parametrize(("count", "weights", "parts"), [(7, [1.0, 1.0], [4, 3]), (1, [1.0, 1.0], [0, 1]),
+                                                         (100, [3.0, 1.0], [75, 25]), (0, [1.0, 1.0], [0, 0])])  # fmt: skip
+def test_samples_are_shared_by_speed(count: int, weights: list[float], parts: list[int]) -> None:
+    assert shares(count, weights) == parts

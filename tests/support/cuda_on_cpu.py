@@ -11,11 +11,12 @@ import hashlib
 import re
 import subprocess
 import sys
+import threading
 import types
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -131,10 +132,34 @@ def _reached(source: Path, kernels: Path) -> str:
     return text + "".join(_reached(kernels / name, kernels) for name in included)
 
 
-def fake_cupy() -> Any:
+class _Device:
+    """One of the devices that are pretended; each thread has its current one."""
+
+    current = threading.local()
+    compute_capability = "90"
+    attributes: ClassVar = {"MaxThreadsPerMultiProcessor": 2048, "MultiProcessorCount": 2}
+
+    def __init__(self, index: int | None = None) -> None:
+        self.id = getattr(self.current, "id", 0) if index is None else index
+        self._before: list[int] = []
+
+    def __enter__(self) -> _Device:
+        self._before.append(getattr(self.current, "id", 0))
+        self.current.id = self.id
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.current.id = self._before.pop()
+
+    def synchronize(self) -> None:
+        pass
+
+
+def fake_cupy(devices: int = 1) -> Any:
     """A module with what luch.cuda asks of CuPy."""
     libraries: dict[int, ctypes.CDLL] = {}
     functions: dict[int, Any] = {}
+    running = threading.Lock()
 
     def module_load_data(image: bytes) -> int:
         libraries[len(libraries) + 1] = ctypes.CDLL(image.decode())
@@ -148,14 +173,9 @@ def fake_cupy() -> Any:
     def launch_kernel(function: int, grid: int, gy: int, gz: int, block: int, by: int, bz: int, shared: int,
                       stream: int, parameters: int, extra: int) -> None:  # fmt: skip
         assert (gy, gz, by, bz, shared, stream, extra) == (1, 1, 1, 1, 0, 0, 0)
-        functions[function](ctypes.c_void_p(parameters), grid, block)
+        with running:  # fibers of one kernel at a time
+            functions[function](ctypes.c_void_p(parameters), grid, block)
 
-    device = types.SimpleNamespace(
-        id=0,
-        compute_capability="90",
-        synchronize=lambda: None,
-        attributes={"MaxThreadsPerMultiProcessor": 2048, "MultiProcessorCount": 2},
-    )
     driver = types.SimpleNamespace(
         moduleLoadData=module_load_data, moduleUnload=lambda module: None, moduleGetFunction=module_get_function, launchKernel=launch_kernel,
         funcGetAttribute=lambda attribute, function: 32,
@@ -163,11 +183,11 @@ def fake_cupy() -> Any:
     )  # fmt: skip
     properties = {"name": b"fibers", "multiProcessorCount": 2, "l2CacheSize": 0, "totalGlobalMem": 0}
     runtime = types.SimpleNamespace(
-        free=lambda ptr: None, getDeviceCount=lambda: 1, getDeviceProperties=lambda i: properties, driverGetVersion=lambda: 0,
+        free=lambda ptr: None, getDeviceCount=lambda: devices, getDeviceProperties=lambda i: properties, driverGetVersion=lambda: 0,
         runtimeGetVersion=lambda: 0, memGetInfo=lambda: (1 << 26, 1 << 26),
     )  # fmt: skip
     cuda = types.SimpleNamespace(
-        Device=lambda: device, driver=driver, runtime=runtime, get_current_stream=lambda: types.SimpleNamespace(ptr=0, synchronize=lambda: None),
+        Device=_Device, driver=driver, runtime=runtime, get_current_stream=lambda: types.SimpleNamespace(ptr=0, synchronize=lambda: None),
         memory=types.SimpleNamespace(OutOfMemoryError=MemoryError),
         Event=_Event, get_elapsed_time=lambda a, b: 1.0,
     )  # fmt: skip
@@ -213,5 +233,5 @@ def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
 
 def forget() -> None:
     """What was loaded for the device so far."""
-    for cached in (device.cupy, device.available, compiler.load, compiler.scene_module):
+    for cached in (device.cupy, device.available, compiler._loaded, compiler.scene_module):
         cached.cache_clear()

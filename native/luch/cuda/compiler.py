@@ -8,12 +8,14 @@ ahead of time lies in luch/kernels and is taken first; its key leaves out the co
 
 from __future__ import annotations
 
+import collections
 import functools
 import hashlib
 import json
 import os
 import sys
 import tempfile
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +26,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 # Scenes whose kernels stay on the device: some megabytes each.
 SCENES_KEPT = 8
 AHEAD = PACKAGE / "kernels"  # NAME.cubin, compiled by build.py
+_COMPILING: dict[str, threading.Lock] = collections.defaultdict(threading.Lock)  # by name in the cache
 SCENE_PROGRAMS = "luch_scene_programs.cuh"  # the header that a scene's own kernels include
 
 
@@ -73,9 +76,13 @@ def ahead_name(module: str, precision: str, architecture: int) -> str:
     )
 
 
-@functools.cache
 def load(module: str, precision: str) -> Module:
     """The module of kernels.json for the current device. Raises DeviceError if it does not compile."""
+    return _loaded(module, precision, int(cupy().cuda.Device().id))
+
+
+@functools.cache
+def _loaded(module: str, precision: str, device: int) -> Module:
     architecture = architecture_of(cupy())
     return Module(ahead(module, precision, architecture) or compiled(module, precision, architecture))
 
@@ -108,10 +115,13 @@ def kept_scene(module: str, precision: str, architecture: int, programs: str, de
 
 
 def compiled_scene(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes:
-    """The same, compiled now and kept."""
+    """The same, compiled now and kept. Several devices of one kind wait for one compiler."""
     from cupy.cuda import nvrtc
 
-    return _compile_and_keep(nvrtc, _Unit(module, precision, architecture, programs, tuple(defines)))
+    unit = _Unit(module, precision, architecture, programs, tuple(defines))
+    name = _cache_name(nvrtc, unit)
+    with _COMPILING[name]:
+        return _kept(name) or _compile_and_keep(nvrtc, unit)
 
 
 class _Unit(NamedTuple):

@@ -1,6 +1,7 @@
 """Renders on a GPU: waves of paths through the stages of native/cuda/render, driven from here.
 
-``DeviceRenderer`` has the methods of ``core.render.Renderer`` that ``luch.render`` uses. The scene is read, and its
+``DeviceRenderer`` has the methods of ``core.render.Renderer`` that ``luch.render`` uses, on one device
+(``luch.cuda.several`` shares samples among many). The scene is read, and its
 lights are built, by the core on the host; the film's sums stay on the device until somebody asks for passes.
 """
 
@@ -123,13 +124,44 @@ def bytes_per_path(stride: int, pixels: int) -> float:
     return float(sizes["path"] + queues + 8 * stride + 4)
 
 
+class HostScene:
+    """What the core makes of a scene for devices: read and built once, however many devices render it."""
+
+    def __init__(self, scene: Any) -> None:
+        self._scene = scene
+        self.core = core.render.Renderer(scene, True, DEVICE_BUILDS_FROM)
+        self.facts: dict[str, Any] = {}
+        self.images: Any = None  # core.render.Renderer.device_images
+
+    def prepare(self) -> bool:
+        """Builds structures and lights. False when cancelled."""
+        if not self.core.prepare():
+            return False
+        self.facts, self.images = self.core.device_facts(), self.core.device_images()
+        return True
+
+    def build_all(self) -> bool:
+        """The same, with nothing left for devices to build. False when cancelled."""
+        self.core = core.render.Renderer(self._scene, True)
+        return self.prepare()
+
+    def set_film(self, rows: Any, counts: Any) -> None:
+        """rows: (pixels, stride) float64; counts: (pixels,) uint32, samples of each."""
+        own_rows, own_counts = self.core.film_arrays()
+        own_rows[...] = rows
+        own_counts[...] = counts
+
+
 class DeviceRenderer:
     """One scene on the current CUDA device. Raises DeviceError where there is none, or its memory is too small."""
 
-    def __init__(self, scene: Any) -> None:
-        """scene: luch.scene.Scene. Raises ValueError, naming the object, for data that does not fit together."""
-        cupy()
-        self._host = core.render.Renderer(scene, True, DEVICE_BUILDS_FROM)
+    def __init__(self, scene: Any, host: HostScene | None = None) -> None:
+        """scene: luch.scene.Scene. Raises ValueError, naming the object, for data that does not fit together.
+
+        host: several devices share one.
+        """
+        self._device = cupy().cuda.Device()
+        self._host = host or HostScene(scene)
         self._scene = scene
         self._lock = threading.Lock()
         self._cancelled = False
@@ -142,24 +174,29 @@ class DeviceRenderer:
     @property
     def device(self) -> str:
         """For the statistics."""
-        return f"CUDA: {describe()['device']}"
+        with self._device:
+            return f"CUDA: {describe()['device']}"
 
     def prepare(self) -> bool:
         """Builds structures and lights, uploads them, makes the kernels. False when cancelled."""
-        if not self._host.prepare() or self._cancelled:
-            return False
+        try:
+            ready = self._host.prepare() and self.prepare_device()
+        except TreesTooDeep:
+            ready = self._host.build_all() and self.prepare_device()
+        self._host.images = None  # they are on the device
+        return ready
+
+    def prepare_device(self) -> bool:
+        """Uploads what the host has built, makes the kernels. False when cancelled. May raise TreesTooDeep."""
+        with self._device:
+            return not self._cancelled and self._prepare()
+
+    def _prepare(self) -> bool:
         enter_context()
         began = time.perf_counter()
-        precision = self._scene.settings.precision
-        try:
-            facts, blocks = self._upload()
-        except TreesTooDeep:
-            self._host = core.render.Renderer(self._scene, True)
-            if not self._host.prepare() or self._cancelled:
-                return False
-            facts, blocks = self._upload()
+        facts, blocks = self._upload()
         self._upload_seconds = time.perf_counter() - began
-        self._paths = load("RENDER_PATHS", precision)
+        self._paths = load("RENDER_PATHS", self._scene.settings.precision)
         self._stages = SceneKernels(facts, blocks, self._scene)
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
@@ -168,8 +205,7 @@ class DeviceRenderer:
 
     def _upload(self) -> tuple[dict[str, Any], Blocks]:
         """The scene and its trees; large ones are built on the device. What decides the scene's kernels."""
-        facts = self._host.device_facts()
-        (blocks, links), (tree_blocks, tree_links), left, depth = self._host.device_images()
+        facts, ((blocks, links), (tree_blocks, tree_links), left, depth) = self._host.facts, self._host.images
         self._arrays = DeviceCopy(blocks, links)
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
                                    facts["one_group"], left, depth)  # fmt: skip
@@ -197,6 +233,10 @@ class DeviceRenderer:
 
     def render(self, first: int, count: int) -> bool:
         """Traces samples [first, first + count) of every pixel. False when cancelled; waves are whole or not at all."""
+        with self._device:
+            return self._render(first, count)
+
+    def _render(self, first: int, count: int) -> bool:
         enter_context()
         memory, began = self._memory, time.perf_counter()
         ranges = [
@@ -254,55 +294,59 @@ class DeviceRenderer:
     def cancel(self) -> None:
         """Callable from any thread: render() returns within one wave's time."""
         self._cancelled = True
-        self._host.cancel()
+        self._host.core.cancel()
 
     def step_progress(self) -> float:
         """Share of the running step that is done, 0..1."""
         return self._waves_done / self._waves if self._waves else 0.0
 
+    def film(self) -> tuple[Any, Any]:
+        """The film's sums (pixels, stride) float64 and samples (pixels,) uint32 so far, on the host."""
+        memory = self._memory
+        with self._lock, self._device:
+            enter_context()
+            if not self._merged:
+                self._launch(self._paths.kernel("merge_layers"), 0, memory.pixels, struct.pack("<I", memory.layers))
+                self._merged = True
+            return memory.rows[0].get(), memory.counts[0].get()
+
     def _download(self) -> None:
         """Brings the film's sums to the host, where passes are read from them."""
-        with self._lock:
-            if self._merged:
-                return
-            enter_context()
-            memory = self._memory
-            self._launch(self._paths.kernel("merge_layers"), 0, memory.pixels, struct.pack("<I", memory.layers))
-            rows, counts = self._host.film_arrays()
-            rows[...] = memory.rows[0].get()
-            counts[...] = memory.counts[0].get()
-            self._merged = True
+        if not self._merged:
+            self._host.set_film(*self.film())
 
     def passes(self) -> dict[str, Any]:
         """Blender's pass name -> float32 (H, W, C), bottom row first."""
         self._download()
-        passes: dict[str, Any] = self._host.passes()
+        passes: dict[str, Any] = self._host.core.passes()
         return passes
 
     def deviations(self) -> tuple[Any, Any]:
         """As core.render.Renderer's."""
         self._download()
-        mean, deviation = self._host.deviations()
+        mean, deviation = self._host.core.deviations()
         return mean, deviation
 
     def stats(self) -> dict[str, Any]:
         """Counts, bytes and seconds, under the names of the CPU's."""
-        stats: dict[str, Any] = self._host.stats()
+        return {**self._host.core.stats(), **self.own_stats()}
+
+    def own_stats(self) -> dict[str, Any]:
+        """Those of them that are the device's; none before prepare()."""
         if not hasattr(self, "_memory"):
-            return stats
-        totals = dict(zip(TOTALS, (int(x) for x in self._memory.totals.get()), strict=True))
-        stats.update(self._counts)
-        stats["shadow_rays"] += totals.pop("transparent_rays")
-        stats.update(totals)
-        stats.update(
-            trace_seconds=self._trace_seconds,
-            upload_seconds=self._upload_seconds,
-            device_scene_bytes=self._arrays.bytes + self._tracer.bytes,
-            device_film_and_paths_bytes=self._memory.bytes,
-            paths_at_once=self._memory.slots,
-            path_bytes=core.render.task_sizes()["path"],
-            kernel_plan=self._stages.plan,
-            kernels="general" if self._stages.general else "the scene's own",
-            kernel_compile_seconds=self._stages.compile_seconds,
-        )
-        return stats
+            return {}
+        with self._device:
+            totals = dict(zip(TOTALS, (int(x) for x in self._memory.totals.get()), strict=True))
+        counts = {**self._counts, **totals}
+        counts["shadow_rays"] += counts.pop("transparent_rays")
+        return counts | {
+            "trace_seconds": self._trace_seconds,
+            "upload_seconds": self._upload_seconds,
+            "device_scene_bytes": self._arrays.bytes + self._tracer.bytes,
+            "device_film_and_paths_bytes": self._memory.bytes,
+            "paths_at_once": self._memory.slots,
+            "path_bytes": core.render.task_sizes()["path"],
+            "kernel_plan": self._stages.plan,
+            "kernels": "general" if self._stages.general else "the scene's own",
+            "kernel_compile_seconds": self._stages.compile_seconds,
+        }
