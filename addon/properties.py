@@ -33,6 +33,12 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         default="CPU",
         description="What computes",
     )
+    texture_memory: FloatProperty(
+        name="Texture Memory",
+        default=0.0,
+        min=0.0,
+        description="Megabytes of images on each GPU, 0 for what fits; the rest is read from the host's memory, slower",
+    )
     gpus: IntProperty(
         name="GPUs", default=0, min=0, max=64, description="How many GPUs share the samples; 0 for all that there are"
     )

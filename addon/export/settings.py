@@ -42,6 +42,7 @@ def export_settings(context: ExportContext) -> Settings:
         precision=scene.luch.precision,
         device=scene.luch.device,
         gpus=scene.luch.gpus,
+        texture_memory=scene.luch.texture_memory,
         estimate_error=scene.luch.estimate_error,
         without_effects=names_of(scene.luch.without_effects),
         force_effects=["ALL"] if scene.luch.force_effects else [],

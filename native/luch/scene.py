@@ -225,6 +225,7 @@ class Settings:
     precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
     integrator: str = "PATH"
     device: str = "CPU"  # or "CUDA"
+    texture_memory: float = 0.0  # MB of images on each GPU, 0: what fits; the rest is read from the host's memory
     gpus: int = 0  # how many of the CUDA devices that are visible, 0: all
     # To see what an effect (luch.effects) costs: left out of the picture; simulated though the scene lacks it. ["ALL"]
     # forces every effect that can be.

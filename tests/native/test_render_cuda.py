@@ -14,7 +14,7 @@ from luch.cuda import device
 from luch.cuda import render as device_render
 from luch.cuda.several import shares
 from luch.render import Progress, render
-from luch.scene import Instances, Material, Scene
+from luch.scene import Image, Instances, Material, Scene
 from luch.shader import ProgramBuilder
 from support.cuda_on_cpu import FIBERS
 from support.effects import closure, program
@@ -173,3 +173,44 @@ def test_a_cancel_stops_every_gpu(place: str, two_gpus: None) -> None:
                                                          (100, [3.0, 1.0], [75, 25]), (0, [1.0, 1.0], [0, 0])])  # fmt: skip
 def test_samples_are_shared_by_speed(count: int, weights: list[float], parts: list[int]) -> None:
     assert shares(count, weights) == parts
+
+
+def checked() -> Scene:
+    """plain(), the floor showing an image of each format."""
+    scene, rng = plain(), np.random.default_rng(3)
+    kinds = (np.uint8, np.float16, np.float32)
+    scene.images = [
+        Image(f"Image {k}", (rng.random((8 << k, 8, 4)) * (255 if k == 0 else 1)).astype(kind))
+        for k, kind in enumerate(kinds)
+    ]
+    builder = ProgramBuilder()
+    uvw = builder.op3("POINT_POSITION", (), (0, 0))
+    for index in range(len(kinds)):
+        color = builder.op("IMAGE", uvw, (builder.image(index), 0, 0, 0, 0))[:3]
+        closure(builder, "CLOSURE_DIFFUSE", {"color": color}, weight=(0.3, 0.3, 0.3))
+    scene.materials = [Material("Checks", builder.finish())]
+    return replace(scene, settings=replace(scene.settings, device="CUDA"))
+
+
+def test_images_that_do_not_fit_are_read_from_the_hosts_memory(place: str) -> None:
+    scene = checked()
+    whole = render(scene)
+    small = replace(scene, settings=replace(scene.settings, texture_memory=1e-3))
+    parts = render(small)
+    assert np.array_equal(whole.passes["Combined"], parts.passes["Combined"])
+    assert whole.stats["warnings"] == []
+    assert parts.stats["warnings"] == ["2 images stay in the host's memory (0.00512 MB): the GPU's has no room, and reads them "
+                                       "more slowly."]  # fmt: skip
+    sizes = [image.pixels.nbytes for image in scene.images]
+    assert whole.stats["device_scene_bytes"] - parts.stats["device_scene_bytes"] == sum(sizes[1:])
+    cpu = render(replace(scene, settings=replace(scene.settings, device="CPU")))
+    check_equal("Combined", cpu.passes["Combined"], parts.passes["Combined"], place)
+    assert cpu.passes["Combined"][..., :3].std() > 0.01, "the images are seen"
+
+
+def test_a_scene_that_does_not_fit_is_told_before_it_is_uploaded(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device.cupy().cuda.runtime, "memGetInfo", lambda: (1000, 1 << 30))
+    with pytest.raises(
+        device.DeviceError, match=r"The scene takes 0\.0 GiB of the GPU's memory, of which 0\.0 are free"
+    ):
+        render(checked())

@@ -56,6 +56,12 @@ def _array(given: Any, dtype: Any = None) -> Any:
     return np.array(given, dtype=dtype).view(Array)
 
 
+class _Pinned(bytearray):
+    @property
+    def ptr(self) -> int:
+        return ctypes.addressof(ctypes.c_char.from_buffer(self))
+
+
 class _Event:
     def record(self) -> None:
         pass
@@ -188,7 +194,7 @@ def fake_cupy(devices: int = 1) -> Any:
     )  # fmt: skip
     cuda = types.SimpleNamespace(
         Device=_Device, driver=driver, runtime=runtime, get_current_stream=lambda: types.SimpleNamespace(ptr=0, synchronize=lambda: None),
-        memory=types.SimpleNamespace(OutOfMemoryError=MemoryError),
+        alloc_pinned_memory=_Pinned, memory=types.SimpleNamespace(OutOfMemoryError=MemoryError),
         Event=_Event, get_elapsed_time=lambda a, b: 1.0,
     )  # fmt: skip
     return types.SimpleNamespace(

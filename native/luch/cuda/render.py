@@ -18,8 +18,8 @@ from luch._native import core
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.scene_kernels import SceneKernels
-from luch.cuda.trace import SceneTracer, TreesTooDeep
-from luch.cuda.upload import Blocks, DeviceCopy
+from luch.cuda.trace import Left, SceneTracer, TreesTooDeep
+from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, too_large
 
 BLOCK = 128  # STAGE_BLOCK of render/stage.cuh
 # Paths under way at once. Fewer leave a large GPU idle in late bounces, more only cost memory.
@@ -29,6 +29,9 @@ FEWEST_PATHS = 1 << 14
 DEVICE_BUILDS_FROM = 20_000
 # Part of the free memory that a wavefront and its film may take.
 MEMORY_SHARE = 0.85
+# Part of the free memory that a scene may take; film and paths want some, too.
+SCENE_SHARE = 0.8
+TREE_BYTES = 200  # of a triangle whose tree the device builds: its corners, its node's share, the builder's work space
 RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
 COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed")  # WaveCounter
 TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
@@ -124,6 +127,15 @@ def bytes_per_path(stride: int, pixels: int) -> float:
     return float(sizes["path"] + queues + 8 * stride + 4)
 
 
+def _told_images(sizes: list[int]) -> list[str]:
+    if not sizes:
+        return []
+    count = "1 image stays" if len(sizes) == 1 else f"{len(sizes)} images stay"
+    return [
+        f"{count} in the host's memory ({sum(sizes) / 1e6:.3g} MB): the GPU's has no room, and reads them more slowly."
+    ]
+
+
 class HostScene:
     """What the core makes of a scene for devices: read and built once, however many devices render it."""
 
@@ -170,6 +182,7 @@ class DeviceRenderer:
         self._trace_seconds = 0.0
         self._upload_seconds = 0.0
         self._merged = True
+        self.warnings: list[str] = []
 
     @property
     def device(self) -> str:
@@ -206,10 +219,24 @@ class DeviceRenderer:
     def _upload(self) -> tuple[dict[str, Any], Blocks]:
         """The scene and its trees; large ones are built on the device. What decides the scene's kernels."""
         facts, ((blocks, links), (tree_blocks, tree_links), left, depth) = self._host.facts, self._host.images
-        self._arrays = DeviceCopy(blocks, links)
+        left_images = self._images_to_leave(blocks, tree_blocks, left)
+        self._arrays = DeviceCopy(blocks, links, left_images)
+        self.warnings = _told_images([len(blocks[number][1]) for number in left_images])
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
                                    facts["one_group"], left, depth)  # fmt: skip
         return facts, blocks
+
+    def _images_to_leave(self, blocks: Blocks, tree_blocks: Blocks, left: Left) -> set[int]:
+        """Images for which there is no room beside the rest, by an estimate before anything is allocated."""
+        images = sum(len(data) for name, data in blocks if name == PIXELS)
+        rest = sum(len(data) for _, data in [*blocks, *tree_blocks]) - images
+        rest += sum(len(corners) * TREE_BYTES for corners, _, _ in left)
+        free, _ = cupy().cuda.runtime.memGetInfo()
+        room = int(free * SCENE_SHARE) - rest
+        if room < 0:
+            raise too_large(rest)
+        budget = self._scene.settings.texture_memory
+        return images_to_leave(blocks, min(room, int(budget * 1e6)) if budget > 0 else room)
 
     def _allocate(self, pixels: int, materials: int) -> Memory:
         """As large a wavefront as the device's memory allows, up to MOST_PATHS."""

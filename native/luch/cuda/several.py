@@ -94,6 +94,7 @@ class SeveralDevices:
         if not kept:
             raise told[0]
         self.warnings += [f"One GPU of {len(self._devices)} is left out: {error}" for error in told]
+        self.warnings += dict.fromkeys(told for device in kept for told in device.warnings)
         self._devices, self._rates = kept, [1.0] * len(kept)
         return not self._cancelled
 

@@ -1,25 +1,48 @@
-"""Views that were made on the CPU, with everything that their pointers lead to, copied to the current device."""
+"""Views that were made on the CPU, with everything that their pointers lead to, copied to the current device.
+
+Images that do not fit stay in the host's memory, where a GPU reads them over the bus: slower, bit for bit the same.
+"""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Collection
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from luch.cuda.device import cupy
+from luch.cuda.device import DeviceError, cupy
 
 Blocks = list[tuple[str, Any]]  # name, (bytes,) uint8
 Links = list[tuple[int, int, int, int]]  # block that holds a pointer, its offset, block it leads to, offset there
+PIXELS = "pixels"  # name of an image's block
+
+
+class HostBlock:
+    """A block that stays on the host, locked in memory so that the device can read it where it lies."""
+
+    nbytes = 0  # on the device
+
+    def __init__(self, count: int) -> None:
+        self.size = count
+        self._memory = cupy().cuda.alloc_pinned_memory(count)
+        self.data = SimpleNamespace(ptr=self._memory.ptr)  # the same address there, as CUDA unifies them
+
+    def set(self, data: Any) -> None:
+        """Fills it."""
+        np.frombuffer(self._memory, np.uint8, self.size)[...] = data
 
 
 class DeviceCopy:
     """Blocks on the device. ``root``: the bytes of the outermost view, its pointers set, to be passed to a kernel."""
 
-    def __init__(self, blocks: Blocks, links: Links) -> None:
-        """blocks[0] is the outermost view; it stays on the host."""
-        cp = cupy()
-        self.arrays: list[Any] = [None, *(cp.empty(len(data), np.uint8) for _, data in blocks[1:])]
+    def __init__(self, blocks: Blocks, links: Links, left: Collection[int] = ()) -> None:
+        """blocks[0] is the outermost view; it stays on the host. left: numbers of blocks that do, too.
+
+        Raises DeviceError where the device's memory does not suffice.
+        """
+        self.arrays: list[Any] = [None, *_allocated(blocks, left)]
         patched: dict[int, bytearray] = {0: bytearray(blocks[0][1])}
         for block, offset, target, target_offset in links:
             host = patched.setdefault(block, bytearray(blocks[block][1]))
@@ -34,3 +57,35 @@ class DeviceCopy:
     def bytes(self) -> int:
         """On the device."""
         return sum(int(array.nbytes) for array in self.arrays[1:])
+
+
+def _allocated(blocks: Blocks, left: Collection[int]) -> list[Any]:
+    cp = cupy()
+    try:
+        return [
+            HostBlock(len(data)) if number in left else cp.empty(len(data), np.uint8)
+            for number, (_, data) in enumerate(blocks)
+            if number
+        ]
+    except cp.cuda.memory.OutOfMemoryError as error:
+        raise too_large(sum(len(data) for _, data in blocks)) from error
+
+
+def too_large(needed: int) -> DeviceError:
+    """What is told of a scene that does not fit."""
+    free, _ = cupy().cuda.runtime.memGetInfo()
+    return DeviceError(
+        f"The scene takes {needed / 2**30:.1f} GiB of the GPU's memory, of which {free / 2**30:.1f} are free. Close "
+        "what else uses the GPU, simplify meshes, or use the CPU."
+    )
+
+
+def images_to_leave(blocks: Blocks, room: int) -> set[int]:
+    """Numbers of the images that stay on the host so that the others fit in `room` bytes: the largest ones."""
+    images = sorted((len(data), number) for number, (name, data) in enumerate(blocks) if name == PIXELS)
+    left: set[int] = set()
+    for size, number in images:
+        room -= size
+        if room < 0:
+            left.add(number)
+    return left
