@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from luch.cuda import device
+from luch.cuda import device, several
 from luch.cuda import render as device_render
-from luch.cuda.several import shares
 from luch.render import Progress, render
 from luch.scene import Image, Instances, Material, Scene
 from luch.shader import ProgramBuilder
@@ -123,11 +122,11 @@ def test_too_little_memory_is_told_with_its_remedy(place: str, monkeypatch: pyte
 
 @pytest.fixture
 def two_gpus(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    runtime = device.cupy().cuda.runtime
+    """Where there is one GPU it stands for both: two contexts of work on it, each with its film."""
     if place == FIBERS:
-        monkeypatch.setattr(runtime, "getDeviceCount", lambda: 2)
-    elif runtime.getDeviceCount() < 2:
-        pytest.skip("there is one GPU")
+        monkeypatch.setattr(device.cupy().cuda.runtime, "getDeviceCount", lambda: 2)
+    elif len(several.usable_devices()) < 2:
+        monkeypatch.setattr(several, "usable_devices", lambda: [0, 0])
 
 
 def test_two_gpus_share_the_samples_and_the_picture_is_the_same(place: str, two_gpus: None) -> None:
@@ -147,10 +146,11 @@ def test_two_gpus_share_the_samples_and_the_picture_is_the_same(place: str, two_
 def test_a_gpu_without_memory_is_left_out_and_named(
     place: str, two_gpus: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    allocate = device_render.DeviceRenderer._allocate
+    allocate, calls = device_render.DeviceRenderer._allocate, []
 
     def full(self: device_render.DeviceRenderer, pixels: int, materials: int) -> Any:
-        if device.cupy().cuda.Device().id == 1:
+        calls.append(pixels)
+        if len(calls) == 2:
             raise device.DeviceError("The GPU has 0 GiB free.")
         return allocate(self, pixels, materials)
 
@@ -172,7 +172,7 @@ def test_a_cancel_stops_every_gpu(place: str, two_gpus: None) -> None:
 @pytest.mark.parametrize(("count", "weights", "parts"), [(7, [1.0, 1.0], [4, 3]), (1, [1.0, 1.0], [0, 1]),
                                                          (100, [3.0, 1.0], [75, 25]), (0, [1.0, 1.0], [0, 0])])  # fmt: skip
 def test_samples_are_shared_by_speed(count: int, weights: list[float], parts: list[int]) -> None:
-    assert shares(count, weights) == parts
+    assert several.shares(count, weights) == parts
 
 
 def checked() -> Scene:

@@ -27,16 +27,21 @@ def renderer_for(scene: Any) -> Any:
 
     Raises DeviceError where there is none, ValueError for data that does not fit together.
     """
-    cp, wanted = cupy(), scene.settings.gpus
+    wanted = scene.settings.gpus
     if wanted < 0:
         raise ValueError(f"Settings: gpus is {wanted}; it can be 0 (all) or how many to use.")
-    usable = []
+    chosen = usable_devices()[: wanted or None]
+    return SeveralDevices(scene, chosen) if len(chosen) > 1 else DeviceRenderer(scene)
+
+
+def usable_devices() -> list[int]:
+    """CUDA's numbers of the devices that can run the kernels. Raises DeviceError where there is none."""
+    cp, usable = cupy(), []
     for index in range(cp.cuda.runtime.getDeviceCount()):
         with cp.cuda.Device(index):
             if architecture_of(cp) >= OLDEST:
                 usable.append(index)
-    chosen = usable[: wanted or len(usable)]
-    return SeveralDevices(scene, chosen) if len(chosen) > 1 else DeviceRenderer(scene)
+    return usable
 
 
 def shares(count: int, weights: list[float]) -> list[int]:
