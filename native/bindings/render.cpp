@@ -118,6 +118,9 @@ class PyRenderer {
         d["transparent_steps"] = s.counts.transparent_steps;
         d["world_points"] = s.counts.world_points;
         d["light_points"] = s.counts.light_points;
+        d["subsurface_walks"] = s.counts.subsurface_walks;
+        d["subsurface_steps"] = s.counts.subsurface_steps;
+        d["subsurface_tree_bytes"] = s.local_tree_bytes;
         return d;
     }
 

@@ -24,6 +24,8 @@ LIGHT_PATH = 16
 HOLDOUT = 32
 EMISSION_FRONT = 64
 EMISSION_BACK = 128
+SUBSURFACE = 256
+SUBSURFACE_BUMP = 512
 
 # AttributeSlot of shade/op.h: defaults of the mesh
 ATTRIBUTE_UV = 0xFFFFFFF0
@@ -34,6 +36,9 @@ ATTRIBUTE_TANGENT = 0xFFFFFFF3
 # Closures that light needs (emission, shadows); their operations come first in the program.
 _LIGHT_CLOSURES = ("CLOSURE_EMISSION", "CLOSURE_TRANSPARENT", "CLOSURE_HOLDOUT")
 _BACKFACING = "POINT_BACKFACING"
+PRINCIPLED = ("CLOSURE_PRINCIPLED", "CLOSURE_PRINCIPLED_SUBSURFACE")
+# Closures that scatter light under the surface -> the first of the three inputs that are their normal.
+SUBSURFACE_NORMAL = {"CLOSURE_SUBSURFACE": 12, "CLOSURE_PRINCIPLED_SUBSURFACE": 14}
 
 
 @dataclass(frozen=True)
@@ -152,8 +157,12 @@ def program_flags(order: Sequence[Node], constant_of: Mapping[int, float], table
             flags |= HOLDOUT
         elif name.startswith("CLOSURE_"):
             flags |= SURFACE
-            if name == "CLOSURE_PRINCIPLED":  # params: bump correction, multiscatter, emits, lets through
+            if name in PRINCIPLED:  # params: bump correction, multiscatter, emits, lets through
                 flags |= (EMISSION if node.params[2] else 0) | (TRANSPARENT if node.params[3] else 0)
+            if name in SUBSURFACE_NORMAL:
+                first = SUBSURFACE_NORMAL[name]
+                bent = any(constant_of.get(value) != 0.0 for value in node.inputs[first : first + 3])
+                flags |= SUBSURFACE | (SUBSURFACE_BUMP if bent else 0)
         elif name.startswith("LIGHT_PATH"):
             flags |= LIGHT_PATH
     if flags & EMISSION:
@@ -190,4 +199,4 @@ def _dark_when(order: Sequence[Node], backfacing: float, constant_of: Mapping[in
 
 def emits(node: Node) -> bool:
     """Whether a Principled closure carries its emission itself (see OpClosurePrincipled)."""
-    return node.op.name == "CLOSURE_PRINCIPLED" and bool(node.params[2])
+    return node.op.name in PRINCIPLED and bool(node.params[2])

@@ -105,17 +105,12 @@ def displaced(scene: bpy.types.Scene) -> None:
     tree.links.new(lift.outputs[0], tree.nodes["Material Output"].inputs["Displacement"])
 
 
-def skin(scene: bpy.types.Scene) -> None:
-    surface(scene).inputs["Subsurface Weight"].default_value = 0.5
-
-
 @pytest.mark.parametrize(
     ("effect", "ask", "who"),
     [
         ("motion blur", motion, "Scene"),
         ("volumes", volume, "Leaves"),
         ("displacement", displaced, "Leaves"),
-        ("subsurface", skin, "Leaves"),
     ],
 )
 def test_what_is_asked_for_in_vain_is_named(
@@ -126,6 +121,17 @@ def test_what_is_asked_for_in_vain_is_named(
     found = exported(room)[effect]
     assert found.state == "not yet"
     assert who in found.reason
+
+
+@pytest.mark.parametrize(("method", "words"), [("RANDOM_WALK", ""), ("RANDOM_WALK_SKIN", ", by Random Walk (Skin)")])
+def test_subsurface_follows_its_weight_and_its_scale(room: bpy.types.Scene, method: str, words: str) -> None:
+    node = surface(room)
+    node.subsurface_method = method
+    assert exported(room)["subsurface"].state == "off"
+    node.inputs["Subsurface Weight"].default_value = 0.5
+    assert exported(room)["subsurface"].reason == f'material "Leaves" has subsurface weight 0.5{words}'
+    node.inputs["Subsurface Scale"].default_value = 0.0
+    assert exported(room)["subsurface"].state == "off"
 
 
 def test_point_clouds_are_told(room: bpy.types.Scene) -> None:

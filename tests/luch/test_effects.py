@@ -91,10 +91,39 @@ def test_a_surface_that_cannot_reflect_uses_no_glossy_bounces() -> None:
     assert effects["indirect light"].reason.startswith("4 at most")
 
 
-def test_subsurface_is_named_as_not_supported() -> None:
-    effect = surface(subsurface_weight=0.5)["subsurface"]
-    assert (effect.on, effect.missing, effect.state) == (False, True, "not yet")
-    assert effect.reason == 'material "Leaves" has subsurface weight 0.5: shown as diffuse'
+METRES = {"subsurface_radius": (0.01, 0.005, 0.0)}
+
+
+def skin(**inputs: object) -> Effect:
+    """Of a Principled that may scatter inside. method: SubsurfaceMethod of bsdf/params.h."""
+    given = {**PLAIN, "subsurface_weight": 0.5, **METRES, **inputs}
+    words = (1, 1, 0, 0, int(given.pop("method", 0)))  # type: ignore[call-overload]
+    return effects_of(scene(lambda b: closure(b, "CLOSURE_PRINCIPLED_SUBSURFACE", given, params=words)))["subsurface"]
+
+
+def test_subsurface_is_on_where_it_has_a_weight_and_a_radius() -> None:
+    assert skin().on
+    assert skin().reason == 'material "Leaves" has subsurface weight 0.5'
+    assert skin(method=1).reason.endswith("weight 0.5, by Random Walk (Skin)")
+    nothing = (
+        {"subsurface_weight": 0.0},
+        {"subsurface_radius": (0.0, 0.0, 0.0)},
+        {"thin_wall": 1.0},
+        {"metallic": 1.0},
+    )
+    for inputs in nothing:
+        effect = skin(**inputs)  # type: ignore[arg-type]
+        assert effect.state == "off", inputs
+        assert effect.reason.startswith("no material scatters light under its surface")
+
+
+def test_a_subsurface_node_is_told_unless_its_radius_is_zero() -> None:
+    for radius, on in ((0.01, True), (0.0, False)):
+        inputs = {"color": ONE, "radius": (radius,) * 3, "ior": 1.4}
+        effects = effects_of(scene(lambda b, given=inputs: closure(b, "CLOSURE_SUBSURFACE", given, params=(1, 3))))
+        assert effects["subsurface"].on == on
+        assert effects["diffuse bounces"].on
+    assert effects_of(scene(principled))["subsurface"].state == "off"
 
 
 def test_a_value_that_varies_counts_as_there() -> None:

@@ -11,6 +11,7 @@ from luch.shader import Value, Vector
 
 from .tree import Compiler, closure_emitter
 
+_SUBSURFACE = {"RANDOM_WALK": 0, "RANDOM_WALK_SKIN": 1, "RANDOM_WALK_LEGACY": 2, "BURLEY": 3}  # SubsurfaceMethod, there
 _MICROFACETS = {"GGX": 0, "BECKMANN": 1, "MULTI_GGX": 2, "ASHIKHMIN_SHIRLEY": 3}  # Microfacets of bsdf/params.h
 
 
@@ -145,10 +146,27 @@ def principled(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     emits = any(b.known(value) != 0.0 for value in glow)
     thin_wall, transmission = c.float(node, "Thin Wall"), c.float(node, "Transmission Weight")
     lets_through = b.known(thin_wall) != 0.0 and b.known(transmission) != 0.0
-    if b.known(thin_wall) in (None, 0.0) and b.known(c.float(node, "Subsurface Weight")) != 0.0:
-        c.warn(node, "scatters under the surface, which is not supported yet; it is shown as diffuse", "subsurface")
     params = _params(c, int(node.distribution == "MULTI_GGX"), int(emits), int(lets_through))
-    b.closure("CLOSURE_PRINCIPLED", weight, _principled_inputs(c, node, thin_wall, glow), params)
+    inputs = _principled_inputs(c, node, thin_wall, glow)
+    radius = _subsurface_radius(c, node, "Subsurface Radius", "Subsurface Scale")
+    walks = b.known(thin_wall) in (None, 0.0) and b.known(c.float(node, "Subsurface Weight")) != 0.0
+    if walks and b.known_vector(radius) != (0.0, 0.0, 0.0):
+        inputs = [*radius, c.float(node, "Subsurface IOR"), *inputs]
+        method = _subsurface_method(c, node, node.subsurface_method)
+        b.closure("CLOSURE_PRINCIPLED_SUBSURFACE", weight, inputs, (*params, method))
+    else:
+        b.closure("CLOSURE_PRINCIPLED", weight, inputs, params)
+
+
+def _subsurface_method(c: Compiler, node: bpy.types.Node, method: str) -> int:
+    if method == "BURLEY":
+        c.warn(node, "asks for Christensen-Burley, which is drawn by a random walk for now")
+    return _SUBSURFACE[method]
+
+
+def _subsurface_radius(c: Compiler, node: bpy.types.Node, radius: str, scale: str) -> Vector:
+    """Metres a channel."""
+    return c.builder.scale(c.vector(node, radius), c.float(node, scale))
 
 
 def _principled_inputs(c: Compiler, node: bpy.types.Node, thin_wall: Value, glow: Vector) -> list[Value]:
@@ -184,10 +202,15 @@ def _principled_inputs(c: Compiler, node: bpy.types.Node, thin_wall: Value, glow
 
 @closure_emitter("ShaderNodeSubsurfaceScattering")
 def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
-    """Subsurface Scattering: diffuse of the same colour."""
-    c.warn(node, "is not supported yet; it is shown as diffuse of its colour", "subsurface")
-    inputs = (*c.color(node, "Color"), c.builder.constant(0.0), *_normal(c, node))
-    c.builder.closure("CLOSURE_DIFFUSE", weight, inputs, _params(c))
+    """Subsurface Scattering; diffuse where its radius is known to be 0."""
+    color, radius = c.color(node, "Color"), _subsurface_radius(c, node, "Radius", "Scale")
+    if c.builder.known_vector(radius) == (0.0, 0.0, 0.0):
+        smooth = c.builder.constant(0.0)
+        c.builder.closure("CLOSURE_DIFFUSE", weight, (*color, smooth, *_normal(c, node)), _params(c))
+        return
+    scalars = (c.float(node, "IOR"), c.float(node, "Roughness"), c.float(node, "Anisotropy"))
+    inputs = (*color, *radius, *scalars, *_normal(c, node))
+    c.builder.closure("CLOSURE_SUBSURFACE", weight, inputs, _params(c, _subsurface_method(c, node, node.falloff)))
 
 
 @closure_emitter("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled")

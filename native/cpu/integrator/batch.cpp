@@ -22,11 +22,13 @@ Batch::Batch(const RenderScene& scene, const FilmView& film)
     hits_.resize(BATCH_PATHS);
     sorted_.resize(BATCH_PATHS);
     hit_material_.resize(BATCH_PATHS);
-    // A path casts one shadow ray and one for ambient occlusion at each point.
-    shadow_rays_.resize(BATCH_PATHS * 2);
-    shadows_.resize(BATCH_PATHS * 2);
-    shadow_kind_.resize(BATCH_PATHS * 2);
-    blocked_.resize(BATCH_PATHS * 2);
+    // A path casts one shadow ray and one for ambient occlusion at each point, and one where it leaves a medium.
+    size_t shadows = size_t(BATCH_PATHS) * (scene.has_subsurface ? 3 : 2);
+    shadow_rays_.resize(shadows);
+    shadows_.resize(shadows);
+    shadow_kind_.resize(shadows);
+    blocked_.resize(shadows);
+    if (scene.has_subsurface) walks_.resize(BATCH_PATHS);
     material_first_.resize(scene.view.material_count + 1);
     aovs_.resize(size_t(film.layout.aov_count) * 4 * SHADE_LANES);
 }
@@ -44,6 +46,8 @@ void BatchCounts::add(const BatchCounts& other) {
     transparent_steps += other.transparent_steps;
     world_points += other.world_points;
     light_points += other.light_points;
+    subsurface_walks += other.subsurface_walks;
+    subsurface_steps += other.subsurface_steps;
 }
 
 BatchCounts Batch::counts() const {
@@ -61,7 +65,9 @@ void Batch::trace(const PixelBlock& block) {
         sort_hits_by_material();
         next_count_ = 0;
         shadow_count_ = 0;
+        walk_count_ = 0;
         shade_hits();
+        if (walk_count_ > 0) walk_subsurface();
         trace_shadows();
         std::swap(rays_, next_rays_);
         std::swap(ray_path_, next_path_);

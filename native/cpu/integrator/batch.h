@@ -8,6 +8,7 @@
 #include "cpu/integrator/render_scene.h"
 #include "cpu/shade/interpreter.h"
 #include "luch/integrator/direct_light.h"
+#include "luch/integrator/subsurface.h"
 #include "luch/shade/surface_setup.h"
 
 namespace luch::cpu {
@@ -24,6 +25,7 @@ struct BatchCounts {
     u64 transparent_steps = 0;  // surfaces that shadow rays looked through, one by one
     u64 world_points = 0;       // directions in which the world's program ran for a ray
     u64 light_points = 0;       // points on lights at which a program ran
+    u64 subsurface_walks = 0, subsurface_steps = 0;
 
     void add(const BatchCounts& other);
 };
@@ -61,6 +63,11 @@ class Batch {
     void setup_chunk(const u32* queue, int count, ShadePoints& points);
     void draw_numbers(const u32* queue, int lit_count);
 
+    // subsurface.cpp
+    bool enters_subsurface(u32 k, int lane, const ClosureSet& set, const SurfacePoint& spawn, Vec3 u);
+    void walk_subsurface();
+    void shade_exits(u32 material, const u32* queue, int count);
+
     // direct_light.cpp
     void sample_lights(const u32* queue, int lit_count);
     void emission_of_samples(const u32* queue, const int* lanes, int count);
@@ -87,6 +94,9 @@ class Batch {
     std::vector<ShadowRay> shadows_;
     std::vector<u32> shadow_kind_;
     std::vector<u8> blocked_;
+
+    int walk_count_ = 0;
+    std::vector<SubsurfaceWalk> walks_;  // of this generation; none where nothing scatters under its surface
 
     struct Scratch;  // chunk-sized work space: points, closures, light samples
     std::unique_ptr<Scratch> scratch_;

@@ -54,8 +54,10 @@ void Renderer::build_all() {
     double start = seconds_now();
     if (input_.for_device)
         build_device_trees();
-    else
+    else {
         build_accel();
+        build_local_trees();
+    }
     stats_.accel_seconds = seconds_now() - start;
     stats_.scene_bytes = store_->bytes();
     scene_.camera = input_.camera;
@@ -95,6 +97,29 @@ void Renderer::build_accel() {
     stats_.accel_reason = chosen.reason;
     stats_.accel = accel_->stats();
     scene_.accel = accel_.get();
+}
+
+// Instances with a material that scatters under the surface; empty: there is none.
+static std::vector<u8> instances_with_subsurface(const SceneView& view) {
+    std::vector<u8> wanted(view.instance_count);
+    bool any = false;
+    for (u32 i = 0; i < view.instance_count; i++) {
+        const InstanceView& instance = view.instances[i];
+        for (u32 slot = 0; slot < instance.material_count; slot++) {
+            u32 material = view.material_table[instance.first_material + slot];
+            if (view.materials[material].program.flags & PROGRAM_SUBSURFACE) wanted[i] = any = true;
+        }
+    }
+    return any ? wanted : std::vector<u8>();
+}
+
+void Renderer::build_local_trees() {
+    std::vector<u8> wanted = instances_with_subsurface(scene_.view);
+    scene_.has_subsurface = !wanted.empty();
+    if (wanted.empty()) return;
+    local_trees_ = std::make_unique<LocalTrees>(scene_.view, wanted, input_.accel.choice.precision, pool_);
+    scene_.local_trees = local_trees_.get();
+    stats_.local_tree_bytes = local_trees_->bytes();
 }
 
 void Renderer::build_device_trees() {

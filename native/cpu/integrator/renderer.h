@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cpu/accel/choice.h"
+#include "cpu/accel/local_trees.h"
 #include "cpu/accel/scene_trees.h"
 #include "cpu/device_image.h"
 #include "cpu/film.h"
@@ -56,6 +57,7 @@ struct RenderStats {
     std::string accel_name, accel_reason;
     double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0;
     u64 scene_bytes = 0;
+    u64 local_tree_bytes = 0;  // trees of what scatters under its surface
     u64 film_pixel_bytes = 0;  // what the film keeps of one pixel
 };
 
@@ -90,6 +92,7 @@ class Renderer {
  private:
     void build_all();
     void build_accel();
+    void build_local_trees();
     void build_device_trees();
     void find_constants();
     void build_lights();
@@ -100,6 +103,7 @@ class Renderer {
     std::unique_ptr<SceneStore> store_;
     ThreadPool pool_;
     std::unique_ptr<Accel> accel_;
+    std::unique_ptr<LocalTrees> local_trees_;
     std::unique_ptr<SceneTrees> trees_;  // instead of accel_, for another device
     LightStore lights_;
     RenderScene scene_;

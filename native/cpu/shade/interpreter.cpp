@@ -92,6 +92,7 @@ bool feeds_light(int op, const u32* params) {
         case OpCode::CLOSURE_HOLDOUT:
             return true;
         case OpCode::CLOSURE_PRINCIPLED:
+        case OpCode::CLOSURE_PRINCIPLED_SUBSURFACE:
             return params[2] != 0 || params[3] != 0;
         default:
             return false;

@@ -51,6 +51,9 @@
 #ifndef LUCH_PLAN_CLAMPING
 #define LUCH_PLAN_CLAMPING 1
 #endif
+#ifndef LUCH_PLAN_SUBSURFACE
+#define LUCH_PLAN_SUBSURFACE 1
+#endif
 
 namespace luch::plan {
 
@@ -70,5 +73,6 @@ inline constexpr bool AMBIENT_OCCLUSION = LUCH_PLAN_AMBIENT_OCCLUSION;
 inline constexpr bool FILTER_GLOSSY = LUCH_PLAN_FILTER_GLOSSY;
 inline constexpr bool HOLDOUT = LUCH_PLAN_HOLDOUT;
 inline constexpr bool CLAMPING = LUCH_PLAN_CLAMPING;
+inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin walls
 
 }  // namespace luch::plan

@@ -31,12 +31,21 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "FILTER_GLOSSY": ("filter glossy",),
     "HOLDOUT": ("holdout",),
     "CLAMPING": ("clamping",),
+    "SUBSURFACE": ("subsurface",),
 }  # fmt: skip
 # Define -> operations of shader programs that make such lobes.
 MADE_BY: dict[str, tuple[str, ...]] = {
     "TOON": ("CLOSURE_TOON",),
     "ASHIKHMIN_SHIRLEY": ("CLOSURE_GLOSSY",),
-    "MICROFACETS": ("CLOSURE_GLOSSY", "CLOSURE_METALLIC", "CLOSURE_GLASS", "CLOSURE_REFRACTION", "CLOSURE_PRINCIPLED"),
+    "MICROFACETS": (
+        "CLOSURE_GLOSSY",
+        "CLOSURE_METALLIC",
+        "CLOSURE_GLASS",
+        "CLOSURE_REFRACTION",
+        "CLOSURE_PRINCIPLED",
+        "CLOSURE_PRINCIPLED_SUBSURFACE",
+        "CLOSURE_SUBSURFACE",
+    ),
 }
 
 

@@ -8,13 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from luch.shader_code import Node, Value
+from luch.shader_code import PRINCIPLED, Node, Value
 
 LOBE_CUTOFF = 1e-5  # LOBE_WEIGHT_CUTOFF: lighter lobes are left out
 THINNEST_FILM_NM = 0.1  # FILM_MIN_THICKNESS_NM
 
 _METAL = "roughness anisotropy rotation normal:3 tangent:3"
 _FILM = "thin_film_thickness thin_film_ior"
+_PRINCIPLED = (
+    "base_color:3 metallic roughness ior thin_wall normal:3 diffuse_roughness subsurface_weight "
+    "subsurface_anisotropy specular_ior_level specular_tint:3 anisotropic anisotropic_rotation tangent:3 "
+    "transmission_weight coat_weight coat_roughness coat_ior coat_tint:3 coat_normal:3 sheen_weight "
+    f"sheen_roughness sheen_tint:3 emission_color:3 emission_strength {_FILM}"
+)
 # Inputs after the weight; NAME:3 is a vector.
 LAYOUTS = {
     "CLOSURE_DIFFUSE": "color:3 roughness normal:3",
@@ -25,12 +31,9 @@ LAYOUTS = {
     "CLOSURE_METALLIC": f"base_color:3 edge_tint:3 ior:3 extinction:3 {_METAL} {_FILM}",
     "CLOSURE_GLASS": f"color:3 roughness ior normal:3 {_FILM}",
     "CLOSURE_REFRACTION": "color:3 roughness ior normal:3",
-    "CLOSURE_PRINCIPLED": (
-        "base_color:3 metallic roughness ior thin_wall normal:3 diffuse_roughness subsurface_weight "
-        "subsurface_anisotropy specular_ior_level specular_tint:3 anisotropic anisotropic_rotation tangent:3 "
-        "transmission_weight coat_weight coat_roughness coat_ior coat_tint:3 coat_normal:3 sheen_weight "
-        f"sheen_roughness sheen_tint:3 emission_color:3 emission_strength {_FILM}"
-    ),
+    "CLOSURE_SUBSURFACE": "color:3 radius:3 ior alpha anisotropy normal:3",
+    "CLOSURE_PRINCIPLED": _PRINCIPLED,
+    "CLOSURE_PRINCIPLED_SUBSURFACE": f"subsurface_radius:3 subsurface_ior {_PRINCIPLED}",
 }
 
 
@@ -125,6 +128,13 @@ class Closure:
         straight = self.number("ior") == 1.0 or self.number("specular_ior_level") == 0.0
         return self.has_dielectric() and (not straight or self.may_pass("thin_film_thickness", THINNEST_FILM_NM))
 
+    def scatters_inside(self) -> bool:
+        """Whether light may go under the surface: there is a weight and a radius, and the wall is not thin."""
+        if self.name == "CLOSURE_SUBSURFACE":
+            return self.may_shine("radius") and self.may_shine("color")
+        walks = self.name == "CLOSURE_PRINCIPLED_SUBSURFACE" and self.may_shine("subsurface_radius")
+        return walks and self.may_pass("subsurface_weight") and self.number("thin_wall") in (None, 0.0)
+
     def _dead_inputs(self) -> set[str]:
         dead: set[str] = set()
         film = "thin_film_thickness" in self._places and self.may_pass("thin_film_thickness", THINNEST_FILM_NM)
@@ -134,7 +144,7 @@ class Closure:
             dead |= {"rotation", "tangent"}
         if self.name == "CLOSURE_METALLIC":  # params[2]: physical conductor
             dead |= {"base_color", "edge_tint"} if self.node.params[2] else {"ior", "extinction"}
-        if self.name != "CLOSURE_PRINCIPLED":
+        if self.name not in PRINCIPLED:
             return dead
         if not self.may_pass("coat_weight"):
             dead |= {"coat_roughness", "coat_ior", "coat_tint", "coat_normal"}
@@ -148,7 +158,9 @@ class Closure:
             dead |= {"ior", "thin_wall", "transmission_weight"}
         if not self.has_dielectric():
             dead |= {"diffuse_roughness", "subsurface_weight", "subsurface_anisotropy", "specular_ior_level"}
-        if not self.may_pass("subsurface_weight") or self.number("thin_wall") == 0.0:
+        if self.name == "CLOSURE_PRINCIPLED_SUBSURFACE" and not self.scatters_inside():
+            dead |= {"subsurface_radius", "subsurface_ior"}
+        if not self.may_pass("subsurface_weight") or not (self.scatters_inside() or self.number("thin_wall") != 0.0):
             dead.add("subsurface_anisotropy")
         return dead
 
@@ -251,8 +263,24 @@ def _principled_base(c: Closure) -> Facts:
     fact = f"has {c.says('subsurface_weight', 'subsurface weight')}"
     if c.number("thin_wall") != 0.0:
         yield "thin subsurface", f"{fact} in a thin wall"
-    if c.number("thin_wall") in (None, 0.0):
-        yield "subsurface", fact
+    if c.scatters_inside():
+        yield "subsurface", f"{fact}{_by_method(c, 4)}"
+
+
+# SubsurfaceMethod of bsdf/params.h, in Blender's words; the usual one needs none.
+_METHODS = ("", "Random Walk (Skin)", "Random Walk (Legacy)", "Christensen-Burley")
+
+
+def _by_method(c: Closure, place: int) -> str:
+    name = _METHODS[c.node.params[place]]
+    return f", by {name}" if name else ""
+
+
+def _subsurface(c: Closure) -> Facts:
+    if c.may_shine("color"):
+        yield "diffuse", "scatters diffusely"
+    if c.scatters_inside():
+        yield "subsurface", f"scatters light under its surface{_by_method(c, 1)}"
 
 
 def _mean(numbers: tuple[float, ...]) -> float:
@@ -271,5 +299,7 @@ _TRAITS = {
     "CLOSURE_METALLIC": _metallic,
     "CLOSURE_REFRACTION": _refraction,
     "CLOSURE_GLASS": _glass,
+    "CLOSURE_SUBSURFACE": _subsurface,
     "CLOSURE_PRINCIPLED": _principled,
+    "CLOSURE_PRINCIPLED_SUBSURFACE": _principled,
 }

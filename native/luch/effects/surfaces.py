@@ -106,13 +106,13 @@ def _add_subsurface(effects: Effects, shown: Shown) -> None:
         shown,
         "no thin wall scatters light under its surface",
     )
-    found = [surface for surface in shown.surfaces if "subsurface" in surface.traits]
-    told = shown.scene.unsupported.get("subsurface", [])
-    if found:
-        reason = f"{facts(found, 'subsurface')}: shown as diffuse"
-    else:
-        reason = told[0] if told else "every subsurface weight is 0" + _only_idle(shown, "subsurface")
-    effects.add("Surfaces", "subsurface", False, reason, missing=bool(found or told))
+    off = "no material scatters light under its surface: every subsurface weight, scale or radius is 0"
+    told = shown.scene.unsupported.get("subsurface", [])  # of a Luch that could not draw it
+    if told and not any("subsurface" in surface.traits for surface in shown.surfaces):
+        effects.add("Surfaces", "subsurface", False, told[0], missing=True)
+        return
+    cost = "such a path goes on inside, by some tens of rays, and the objects have one tree more"
+    add_trait(effects, "Surfaces", "subsurface", "subsurface", shown, off, cost=cost)
 
 
 def _add_holdout(effects: Effects, shown: Shown) -> None:

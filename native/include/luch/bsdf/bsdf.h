@@ -13,6 +13,7 @@ namespace luch {
 LUCH_FN Vec3 mirrored_at(Vec3 w, Vec3 n) { return w - n * (2.0f * dot(w, n)); }
 
 LUCH_FN bool is_diffuse(LobeType t) { return t <= LobeType::SHEEN; }
+LUCH_FN bool is_subsurface(LobeType t) { return t >= LobeType::SUBSURFACE && t <= LobeType::SUBSURFACE_DISK; }
 
 // A lobe's light counts by its kind and, for glass, by the side it leaves on.
 LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
@@ -21,6 +22,10 @@ LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
         case LobeType::OREN_NAYAR:
         case LobeType::TRANSLUCENT:
         case LobeType::TOON_DIFFUSE:
+        case LobeType::SUBSURFACE:
+        case LobeType::SUBSURFACE_SKIN:
+        case LobeType::SUBSURFACE_LEGACY:
+        case LobeType::SUBSURFACE_DISK:
         case LobeType::SHEEN:
             return CLASS_DIFFUSE;
         case LobeType::MICROFACET_REFRACTION:
@@ -63,6 +68,10 @@ LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
         case LobeType::MICROFACET_GLASS:
             if constexpr (plan::MICROFACETS) return eval_microfacet(lobe, wo, wi);
             break;
+        case LobeType::SUBSURFACE:
+        case LobeType::SUBSURFACE_SKIN:
+        case LobeType::SUBSURFACE_LEGACY:
+        case LobeType::SUBSURFACE_DISK:
         case LobeType::NONE_:
             break;
     }
@@ -216,6 +225,7 @@ LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 wo) {
 LUCH_FN bool has_smooth_lobe(const ClosureSet& set) {
     for (int i = 0; i < set.count; ++i) {
         const Lobe& lobe = set.lobes[i];
+        if (plan::SUBSURFACE && is_subsurface(lobe.type)) continue;  // light is looked for where it comes out
         if (lobe.type == LobeType::ASHIKHMIN_SHIRLEY ? !is_phong_mirror(lobe)
                                                      : lobe.type < LobeType::MICROFACET_REFLECTION || !is_mirror(lobe))
             return true;

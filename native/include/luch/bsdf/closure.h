@@ -13,6 +13,12 @@ enum class LobeType : u8 {
     OREN_NAYAR,
     TRANSLUCENT,
     TOON_DIFFUSE,
+    // Scatter under the surface: no direction finds them, the integrator walks inside. c0: colour, c1: radii in metres,
+    // ior and alpha_x: of the interface, extra: anisotropy (bsdf/subsurface.h).
+    SUBSURFACE,         // random walk, the radius as given
+    SUBSURFACE_SKIN,    // random walk, the radius made fit the colour; half of the entries diffuse
+    SUBSURFACE_LEGACY,  // random walk of Blender before 5.2
+    SUBSURFACE_DISK,    // Christensen and Burley's profile, probed
     SHEEN,           // microfibre, LTC; the last that counts as diffuse
     ASHIKHMIN_SHEEN, // legacy velvet
     TOON_GLOSSY,
@@ -20,7 +26,7 @@ enum class LobeType : u8 {
     MICROFACET_REFRACTION,
     MICROFACET_GLASS,         // reflection and refraction in one lobe
     ASHIKHMIN_SHIRLEY,
-    // hair, subsurface, ray portal: later, each one line here and one header
+    // hair, ray portal: later, each one line here and one header
 };
 
 // What a lobe counts as for passes, bounces and ray visibility.

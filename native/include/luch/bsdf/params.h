@@ -8,6 +8,19 @@ namespace luch {
 // Menu of the microfacet nodes. Each node offers a part of it.
 enum class Microfacets : u8 { GGX, BECKMANN, MULTI_GGX, ASHIKHMIN_SHIRLEY };
 
+// Menu of the nodes that scatter light under the surface.
+enum class SubsurfaceMethod : u8 { RANDOM_WALK, SKIN, LEGACY, BURLEY };
+
+struct SubsurfaceParams {
+    Color color = {0.8f, 0.8f, 0.8f};
+    Vec3 radius = {};  // mean free path a channel, metres: the node's radius times its scale; 0: diffuse
+    float ior = 1.4f;
+    float alpha = 1.0f;  // of the interface where light goes in, GGX
+    float anisotropy = 0.0f;
+    Vec3 normal = {};
+    SubsurfaceMethod method = SubsurfaceMethod::RANDOM_WALK;
+};
+
 struct GlossyParams {
     Color color = {0.8f, 0.8f, 0.8f};
     float roughness = 0.5f;
@@ -53,8 +66,11 @@ struct PrincipledParams {
     bool thin_wall = false;
     Vec3 normal = {};
     float diffuse_roughness = 0.0f;
-    float subsurface_weight = 0.0f;  // scatters as diffuse, but in a thin wall, where it is exact
+    float subsurface_weight = 0.0f;
     float subsurface_anisotropy = 0.0f;
+    Vec3 subsurface_radius = {};    // times the node's scale, metres; 0: diffuse. Not of thin walls
+    float subsurface_ior = 1.4f;    // of SKIN; the other methods take ior
+    SubsurfaceMethod subsurface_method = SubsurfaceMethod::RANDOM_WALK;
     float specular_ior_level = 0.5f;
     Color specular_tint = {1.0f, 1.0f, 1.0f};
     float anisotropic = 0.0f, anisotropic_rotation = 0.0f;

@@ -4,6 +4,7 @@
 //   alpha > sheen > coat > (emission) > metal | glass | dielectric specular > diffuse
 #pragma once
 #include "luch/bsdf/sheen.h"
+#include "luch/bsdf/subsurface.h"
 #include "luch/bsdf/thin_wall.h"
 
 namespace luch {
@@ -125,13 +126,22 @@ LUCH_FN Color mix_glass(ClosureSet& set, Color weight, const PrincipledSurface& 
     return weight * (1.0f - amount);
 }
 
+// Index of refraction with Specular IOR Level; *f0: what it reflects straight on.
+LUCH_FN float specular_ior(const PrincipledSurface& s, float* f0) {
+    float level = max_f(s.p.specular_ior_level, 0.0f);
+    *f0 = f0_from_ior(s.ior);
+    if (level == 0.5f) return s.ior;
+    *f0 *= 2.0f * level;
+    float eta = ior_from_f0(*f0);
+    return s.ior < 1.0f ? 1.0f / eta : eta;
+}
+LUCH_FN float specular_ior(const PrincipledSurface& s) {
+    float f0;
+    return specular_ior(s, &f0);
+}
+
 LUCH_FN Color layer_specular(ClosureSet& set, Color weight, const PrincipledSurface& s) {
-    float eta = s.ior, f0 = f0_from_ior(eta), level = max_f(s.p.specular_ior_level, 0.0f);
-    if (level != 0.5f) {
-        f0 *= 2.0f * level;
-        eta = ior_from_f0(f0);
-        if (s.ior < 1.0f) eta = 1.0f / eta;
-    }
+    float f0, eta = specular_ior(s, &f0);
     Lobe lobe;
     if (!allows_reflective_caustics(s.c) || !(eta != 1.0f || s.film_thickness > FILM_MIN_THICKNESS_NM)) return weight;
     if (!start_lobe(lobe, LobeType::MICROFACET_REFLECTION, weight, s.specular_n, s.c)) return weight;
@@ -149,12 +159,28 @@ LUCH_FN Color layer_specular(ClosureSet& set, Color weight, const PrincipledSurf
     return weight_under(lobe.weight * reflected, weight);
 }
 
+// level_ior: the index that Specular IOR Level asks for.
+LUCH_FN void scatter_inside(ClosureSet& set, Color weight, float level_ior, const PrincipledSurface& s) {
+    bool skin = s.p.subsurface_method == SubsurfaceMethod::SKIN;
+    SubsurfaceParams inside;
+    inside.color = s.clamped_base;
+    inside.radius = s.p.subsurface_radius;
+    inside.ior = skin ? s.p.subsurface_ior : level_ior;
+    inside.alpha = sqr(s.roughness);
+    inside.anisotropy = s.p.subsurface_anisotropy;
+    inside.normal = s.n;
+    inside.method = s.p.subsurface_method;
+    setup_subsurface(set, weight, inside, s.c);
+}
+
 LUCH_FN void base_diffuse(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float subsurface = saturate_f(s.p.subsurface_weight), roughness = saturate_f(s.p.diffuse_roughness);
-    // In a thin wall scattering under the surface is exact; elsewhere it falls back to diffuse.
-    if (s.p.thin_wall && subsurface > LOBE_WEIGHT_CUTOFF) {
+    if (subsurface > LOBE_WEIGHT_CUTOFF && s.p.thin_wall) {  // where it is exact
         setup_thin_subsurface(set, s.clamped_base * weight * subsurface, s.p.subsurface_anisotropy, roughness,
                               s.clamped_base, s.n, s.c);
+        weight *= 1.0f - subsurface;
+    } else if (plan::SUBSURFACE && subsurface > LOBE_WEIGHT_CUTOFF && !is_zero(s.p.subsurface_radius)) {
+        scatter_inside(set, weight * subsurface, specular_ior(s), s);
         weight *= 1.0f - subsurface;
     }
     Lobe lobe;

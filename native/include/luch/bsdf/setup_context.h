@@ -17,6 +17,7 @@ struct SetupContext {
     bool caustics_reflective = true;  // the scene's switches; they matter after a diffuse bounce
     bool caustics_refractive = true;
     bool bump_correction = true;      // the material's Bump Map Correction
+    float subsurface_min_radius = 0.0f;  // metres; what scatters over less is diffuse (bsdf/subsurface.h)
 };
 
 LUCH_FN bool allows_reflective_caustics(const SetupContext& c) {

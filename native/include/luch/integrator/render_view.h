@@ -28,6 +28,7 @@ struct RenderView {
     bool has_lights;          // anything that sample_light could choose
     bool has_visible_lamps;   // lamps of finite size that rays may meet
     bool has_world;           // one that is not black
+    bool has_subsurface;      // some surface scatters light under itself
     bool can_meet_light;      // a ray may come upon an emitter, a lamp or the world by itself
     u32 world_visibility, world_lightgroup;
     ConstantEmission world_emission;

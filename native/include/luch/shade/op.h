@@ -74,6 +74,8 @@ enum ProgramFlag : u32 {
     PROGRAM_HOLDOUT = 32u,
     PROGRAM_EMISSION_FRONT = 64u,   // emits only where the front face is seen
     PROGRAM_EMISSION_BACK = 128u,
+    PROGRAM_SUBSURFACE = 256u,      // may scatter light under the surface
+    PROGRAM_SUBSURFACE_BUMP = 512u, // whose normal is not the interpolated one
 };
 
 }  // namespace luch

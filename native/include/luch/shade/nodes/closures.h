@@ -3,6 +3,7 @@
 // length means the shading normal, a tangent of zero length that the lobe is round.
 #pragma once
 #include "luch/bsdf/setup.h"
+#include "luch/math/bounds.h"
 #include "luch/shade/nodes/point.h"
 
 namespace luch {
@@ -194,6 +195,48 @@ struct OpClosurePrincipled {
         InputReader read{in};
         Color weight = read.vec3();
         setup_principled(*c.closures, weight, parameters(read, params), setup_context(c, params[0] != 0));
+    }
+};
+
+// Where light may go in: triangles. In a sphere that is seen from outside alone, a walk would find no way out.
+LUCH_FN float smallest_walk_radius(const OpContext& c) {
+    u32 instance = c.points->instance[c.lane];
+    if (instance == NONE) return INFINITE_DISTANCE;
+    if (is_sphere(c.scene->meshes[c.scene->instances[instance].mesh], c.points->prim[c.lane])) return INFINITE_DISTANCE;
+    return SUBSURFACE_MIN_ULP * EPS * max_component(abs_v(position_at(c)));
+}
+
+LUCH_LOBE_OP(OpClosureSubsurface, 12, 2, {  // params[1]: SubsurfaceMethod
+    SubsurfaceParams p;
+    p.color = read.vec3();
+    p.radius = read.vec3();
+    p.ior = read.number();
+    p.alpha = read.number();
+    p.anisotropy = read.number();
+    p.normal = read.vec3();
+    p.method = SubsurfaceMethod(params[1]);
+    context.subsurface_min_radius = smallest_walk_radius(c);
+    setup_subsurface(set, weight, p, context);
+});
+
+// Principled that scatters under its surface. params[4]: SubsurfaceMethod.
+struct OpClosurePrincipledSubsurface {
+    static constexpr int inputs = OpClosurePrincipled::inputs + 4, outputs = 0, params = 5;
+    LUCH_FN static void eval(const OpContext& c, const u32* params, const float* in, float*) {
+        const u32 flags = c.points->flags[c.lane];
+        if ((flags & PATH_EMISSION_ONLY) && params[2] == 0) return;
+        if ((flags & PATH_TRANSPARENT_ONLY) && params[3] == 0) return;
+        InputReader read{in};
+        Color weight = read.vec3();
+        Vec3 radius = read.vec3();
+        float ior = read.number();
+        PrincipledParams p = OpClosurePrincipled::parameters(read, params);
+        p.subsurface_radius = radius;
+        p.subsurface_ior = ior;
+        p.subsurface_method = SubsurfaceMethod(params[4]);
+        SetupContext context = setup_context(c, params[0] != 0);
+        context.subsurface_min_radius = smallest_walk_radius(c);
+        setup_principled(*c.closures, weight, p, context);
     }
 };
 
