@@ -23,6 +23,8 @@ OLDEST = 75  # PTX for it runs on everything newer
 FUSES_BOXES = re.compile("CWBVH|TRACE_.*|RENDER_STAGES")
 # Where a walk is in doubt, its cells are found in double (accel/grid.h).
 WALKS_IN_DOUBLE = re.compile("(TRACE_)?(HIERARCHICAL_)?GRID")
+# The driver would compile them for minutes; luch.cuda.compiler has them compiled for the scene instead.
+NO_PTX = ("RENDER_STAGES",)
 Unit = Tuple[str, str]  # module, precision
 
 
@@ -138,12 +140,14 @@ def place_kernels() -> None:
         "print(json.dumps([ahead_name(*unit) for unit in json.loads(sys.argv[1])]))"
     )
     wanted = [(*unit, architecture) for unit in units() for architecture in table()["architectures"]]
+    wanted += [(*unit, 0) for unit in units() if unit[0] not in NO_PTX]
     names = output([str(VENV_PYTHON), "-c", code, json.dumps(wanted)])
     if names is None:
         raise BuildFailure("luch.cuda could not be imported from native/")
     shutil.rmtree(AHEAD, ignore_errors=True)
     AHEAD.mkdir()
     for (module, precision, architecture), name in zip(wanted, json.loads(names)):
-        shutil.copyfile(FOLDER / f"{module}-{precision}-sm_{architecture}.cubin", AHEAD / name)
+        target = f"-sm_{architecture}.cubin" if architecture else ".ptx"
+        shutil.copyfile(FOLDER / f"{module}-{precision}{target}", AHEAD / name)
     size = sum(path.stat().st_size for path in AHEAD.iterdir())
     print(f"{len(wanted)} kernels, {size / 1e6:.0f} MB in {AHEAD}; the next package carries them")

@@ -232,6 +232,16 @@ def test_kernels_compiled_ahead_of_time_are_taken_first(monkeypatch: pytest.Monk
         monkeypatch.undo()
 
 
+def test_an_architecture_that_the_build_did_not_know_takes_ptx(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(compiler, "AHEAD", tmp_path)
+    assert compiler.ahead("CWBVH", "WATERTIGHT", 130) is None
+    (tmp_path / compiler.ahead_name("CWBVH", "WATERTIGHT", 0)).write_bytes(b"ptx")
+    assert compiler.ahead("CWBVH", "WATERTIGHT", 130) == b"ptx"
+    assert compiler.ahead("CWBVH", "DOUBLE", 130) is None
+    (tmp_path / compiler.ahead_name("CWBVH", "WATERTIGHT", 90)).write_bytes(b"cubin")
+    assert compiler.ahead("CWBVH", "WATERTIGHT", 90) == b"cubin"
+
+
 @pytest.mark.parametrize("precision", ["WATERTIGHT", "FAST"], ids="fibers-{}".format)
 def test_lanes_of_the_wide_tree_keep_out_of_each_others_shared_memory(tmp_path: Path, precision: Any) -> None:
     """With every thread's arrays apart the hits are the same: no thread reads what another wrote, none can race."""

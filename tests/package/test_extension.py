@@ -46,7 +46,7 @@ def test_wheel_holds_every_module_of_the_core_and_no_foreign_one(extension_zip: 
     native = ROOT / "native"  # what luch/cuda compiles on the user's machine
     device = {f"luch/include/{path.relative_to(native / 'include')}" for path in (native / "include").rglob("*.*")}
     device |= {f"luch/cuda_source/{path.relative_to(native / 'cuda')}" for path in (native / "cuda").rglob("*.*")}
-    ahead = {f"luch/{path.relative_to(native / 'luch')}" for path in (native / "luch").rglob("*.cubin")}
+    ahead = {f"luch/{path.relative_to(native / 'luch')}" for path in (native / "luch" / "kernels").rglob("*.*")}
     assert {name for name in packed if name.startswith("luch/")} == sources | cores | device | ahead
 
 

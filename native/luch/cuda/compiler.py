@@ -69,10 +69,13 @@ def flags(precision: str) -> list[str]:
 
 
 def ahead_name(module: str, precision: str, architecture: int) -> str:
-    """File name under which a kernel compiled ahead of time is looked for."""
+    """File name under which a kernel compiled ahead of time is looked for. architecture 0: PTX, for all of them."""
     parts = [_sources_hash(), source_of(module).name, *flags(precision), str(architecture)]
+    key = hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:16]
     return (
-        f"{module}-{precision}-sm_{architecture}-{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:16]}.cubin"
+        f"{module}-{precision}-{key}.ptx"
+        if architecture == 0
+        else f"{module}-{precision}-sm_{architecture}-{key}.cubin"
     )
 
 
@@ -88,9 +91,16 @@ def _loaded(module: str, precision: str, device: int) -> Module:
 
 
 def ahead(module: str, precision: str, architecture: int) -> bytes | None:
-    """What build.py compiled ahead of time."""
-    ready = AHEAD / ahead_name(module, precision, architecture)
-    return ready.read_bytes() if ready.is_file() else None
+    """What build.py compiled ahead of time: machine code, or PTX where the build did not know the architecture.
+
+    The stages have no PTX: the driver would need minutes for all that general code may do, NVRTC needs seconds for
+    what a scene does.
+    """
+    for target in (architecture, 0):
+        ready = AHEAD / ahead_name(module, precision, target)
+        if ready.is_file():
+            return ready.read_bytes()
+    return None
 
 
 def compiled(module: str, precision: str, architecture: int) -> bytes:
