@@ -358,12 +358,18 @@ class DeviceRenderer:
         """Counts, bytes and seconds, under the names of the CPU's."""
         return {**self._host.core.stats(), **self.own_stats()}
 
+    def _shading_kernel(self) -> dict[str, float]:
+        """What the dearest stage takes of a multiprocessor."""
+        told = self._stages.kernel("shade_surfaces").properties(BLOCK)
+        return {name: told[name] for name in ("registers", "local_bytes", "occupancy")}
+
     def own_stats(self) -> dict[str, Any]:
         """Those of them that are the device's; none before prepare()."""
         if not hasattr(self, "_memory"):
             return {}
         with self._device:
             totals = dict(zip(TOTALS, (int(x) for x in self._memory.totals.get()), strict=True))
+            shading = self._shading_kernel()
         counts = {**self._counts, **totals}
         counts["shadow_rays"] += counts.pop("transparent_rays")
         return counts | {
@@ -374,6 +380,7 @@ class DeviceRenderer:
             "paths_at_once": self._memory.slots,
             "path_bytes": core.render.task_sizes()["path"],
             "kernel_plan": self._stages.plan,
+            "shading_kernel": shading,
             "kernels": "general" if self._stages.general else "the scene's own",
             "kernel_compile_seconds": self._stages.compile_seconds,
         }
