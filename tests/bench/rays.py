@@ -18,6 +18,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +145,37 @@ def ratios(rows: list[Row]) -> dict[str, dict[str, float]]:
     return found
 
 
+def best_wall(work: Callable[[], Any], rounds: int) -> float:
+    """Seconds by the clock, the least of some."""
+    took = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        work()
+        took.append(time.perf_counter() - start)
+    return min(took)
+
+
+def scaling(options: argparse.Namespace) -> None:
+    """Two threads against one, the eight-wide tree and Embree's default: by the clock, on a machine that is idle."""
+    print(
+        f"{'mesh':10} "
+        + " ".join(f"{k:>8}" for k in KINDS)
+        + "   build   (two threads over one; build beside Embree's)"
+    )
+    for name in options.meshes.split(","):
+        scene = (MESHES | HARD_MESHES)[name]()
+        mesh = scene.positions, scene.triangles
+        trees = [Accel(*mesh, kind="BVH", threads=count) for count in (1, 2)]
+        ratios = []
+        for kind, rays in ray_sets(scene, 1024, options.rays).items():
+            one, two = (best_wall(partial(tree.any if kind == "shadow" else tree.closest, rays), 5) for tree in trees)
+            ratios.append(one / two)
+        builds = [best_wall(lambda n=count, m=mesh: Accel(*m, kind="BVH", threads=n), 3) for count in (1, 2)]
+        peer = best_wall(lambda m=mesh: EmbreeAccel(*m, "default", 2), 3)
+        print(f"{name:10} " + " ".join(f"{ratio:8.2f}" for ratio in ratios)
+              + f"{builds[0] / builds[1]:8.2f}   {builds[1] / peer:.2f} of Embree's time")  # fmt: skip
+
+
 def main() -> None:
     """Parses the command line, races, writes out/bench/rays.json."""
     parser = argparse.ArgumentParser(prog="build.py bench rays", description=__doc__,
@@ -157,7 +189,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--builds", type=int, default=1)
     parser.add_argument("--docs", action="store_true", help="write the tables and plots of docs/rays.md")
+    parser.add_argument("--scaling", action="store_true", help="two threads against one instead of the race")
     options = parser.parse_args()
+    if options.scaling:
+        scaling(options)
+        return
     rows: list[Row] = []
     for name in options.meshes.split(","):
         rows += race((MESHES | HARD_MESHES)[name](), options)
