@@ -66,25 +66,25 @@ py::dict resolve_film(const cpu::Film& film) {
 py::tuple film_deviations(const cpu::Film& film) {
     py::ssize_t height = film.height(), width = film.width();
     Floats mean({height, width, py::ssize_t{3}}), deviation({height, width, py::ssize_t{3}});
+    double before = 0.0;
     float *to_mean = mean.mutable_data(), *to_deviation = deviation.mutable_data();
     {
         py::gil_scoped_release release;
         cpu::ThreadPool pool(u64{film.width()} * film.height() < 65536 ? 1 : 0);
-        film.deviations(to_mean, to_deviation, pool);
+        before = film.deviations(to_mean, to_deviation, pool);
     }
-    return py::make_tuple(mean, deviation);
+    return py::make_tuple(mean, deviation, before);
 }
 
 void bind_film(py::module_& m) {
     auto film = m.def_submodule("film", "Sums of samples, and render passes read from them.");
     py::class_<cpu::Film>(film, "Film")
-        .def(py::init([](const py::handle& settings, const py::handle& origin, bool halves) {
+        .def(py::init([](const py::handle& settings, const py::handle& origin, bool marks) {
                  cpu::FilmSpec spec = read_film(settings, origin);
-                 spec.halves = halves;
-                 if (halves) spec.passes.push_back("Combined Half");
+                 spec.marks = marks;
                  return std::make_unique<cpu::Film>(spec);
              }),
-             py::arg("film"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0), py::arg("halves") = false)
+             py::arg("film"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0), py::arg("marks") = false)
         .def("channel",
              [](const cpu::Film& self, const std::string& name) {
                  for (const cpu::Pass& pass : self.passes())
@@ -111,11 +111,16 @@ void bind_film(py::module_& m) {
              })
         .def(
             "count_samples",
-            [](cpu::Film& self, u32 pixel, u32 samples, bool other_half) {
+            [](cpu::Film& self, u32 pixel, u32 samples) {
                 FilmWriter writer{self.view(), 0};
-                film_count_samples(writer, pixel, samples, other_half ? samples : 0u);
+                film_count_samples(writer, pixel, samples);
             },
-            py::arg("pixel"), py::arg("samples"), py::arg("other_half") = false)
+            py::arg("pixel"), py::arg("samples"))
+        .def("mark",
+             [](cpu::Film& self, u32 pixel, u32 sample) {
+                 FilmWriter writer{self.view(), 0};
+                 film_mark(writer, pixel, sample);
+             })
         .def("merge", &cpu::Film::merge)
         .def("resolve", &resolve_film)
         .def("deviations", &film_deviations);

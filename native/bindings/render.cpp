@@ -157,6 +157,7 @@ py::dict task_fields() {
     LUCH_FIELD(wave.counters);
     LUCH_FIELD(wave.totals);
     LUCH_FIELD(film.layout.stride);
+    LUCH_FIELD(film.layout.marks);
     LUCH_FIELD(film.layout.aov_count);
     LUCH_FIELD(film.layout.ambient_occlusion);
 #undef LUCH_FIELD
@@ -192,7 +193,8 @@ void bind_render(py::module_& m) {
         .def("step_progress", &PyRenderer::step_progress, "Share of the running step that is done, 0..1.")
         .def("passes", &PyRenderer::passes, "Blender's pass name -> float32 (H, W, C), bottom row first.")
         .def("deviations", &PyRenderer::deviations,
-             "(mean, deviation), float32 (H, W, 3): Combined, and one draw of its error. Asks for Film.halves.")
+             "(mean, deviation, share): float32 (H, W, 3) Combined and one draw of its error; the part of the samples "
+             "before the mark that parts them. Asks for Settings.estimate_error.")
         .def("device_images", [](const py::object& self) { return PyRenderer::device_images(self); })
         .def("film_arrays", [](const py::object& self) { return PyRenderer::film_arrays(self); })
         .def("device_facts", &PyRenderer::device_facts)

@@ -386,8 +386,10 @@ struct Reader {
         input.light_tree = py::cast<bool>(settings.attr("light_tree"));
         input.seed = count("seed");
         input.samples = count("samples");
+        input.first_sample = count("first_sample");
+        input.samples_in_all = count("samples_in_all");
         input.threads = count("threads");
-        input.film.halves = py::cast<bool>(settings.attr("estimate_error"));
+        input.film.marks = py::cast<bool>(settings.attr("estimate_error"));
         input.accel = cpu::accel_request(py::cast<std::string>(settings.attr("accelerator")),
                                          py::cast<std::string>(settings.attr("precision")));
         for (const auto& name : py::cast<std::vector<std::string>>(settings.attr("force_effects")))

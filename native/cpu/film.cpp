@@ -1,6 +1,7 @@
 #include "cpu/film.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -66,20 +67,16 @@ class LayoutBuilder {
     explicit LayoutBuilder(const FilmSpec& spec) : spec_(spec) {
         for (const Known& known : known_passes) layout.*known.channel = NONE;
         for (const KnownCrypto& crypto : known_cryptos) layout.*crypto.channel = NONE;
-        layout.half = layout.lightgroups = layout.aovs = NONE;
+        layout.marks = layout.lightgroups = layout.aovs = NONE;
         layout.combined = take(4);
         passes.push_back({"Combined", 4, PassKind::COMBINED, layout.combined});
-        if (spec.halves) layout.half = take(4);
+        if (spec.marks) layout.marks = take(MARKS * MARK_CHANNELS);
     }
 
     void add(const std::string& name) {
         if (exists(name) || is_named_elsewhere(name)) return;
         if (name == "Sample Count" || name == "Debug Sample Count") {
             passes.push_back({name, 1, PassKind::SAMPLE_COUNT, NONE});
-            return;
-        }
-        if (name == "Combined Half" && spec_.halves) {
-            passes.push_back({name, 3, PassKind::HALF, layout.half});
             return;
         }
         if (add_known(name) || add_crypto(name)) return;
@@ -181,6 +178,17 @@ float to_float(double x) {
     return static_cast<float>(std::clamp(x, -biggest, biggest));
 }
 
+// Of the marks, the one that leaves the most even parts; of equal ones the later.
+const FilmSum* most_even_mark(const FilmSum* row, const FilmLayout& layout, u32 samples) {
+    const FilmSum* best = row + layout.marks;
+    for (u32 i = 1; i < MARKS; ++i) {
+        const FilmSum* mark = row + layout.marks + i * MARK_CHANNELS;
+        double gain = mark[3] * (samples - mark[3]) - best[3] * (samples - best[3]);
+        if (gain > 0.0 || (gain == 0.0 && mark[3] > best[3])) best = mark;
+    }
+    return best;
+}
+
 // Light over colour. Where the colour has no red (green, blue), the others speak for it.
 void divide_color(const FilmSum* light, const FilmSum* color, double scale, float* out) {
     double sum = 0.0;
@@ -238,9 +246,6 @@ void read_pixel(const Pass& pass, const FilmSum* row, const FilmLayout& layout, 
         case PassKind::CRYPTO:
             read_crypto(from, layout.crypto_slots, pass.layer, mean, out);
             break;
-        case PassKind::HALF:
-            for (int k = 0; k < 3; ++k) out[k] = from[3] > 0.0 ? to_float(from[k] / from[3] * exposure) : 0.0f;
-            break;
     }
 }
 
@@ -290,25 +295,29 @@ void Film::resolve(const std::vector<float*>& out, ThreadPool& pool) const {
     });
 }
 
-void Film::deviations(float* mean, float* deviation, ThreadPool& pool) const {
-    if (layout_.half == NONE) throw std::logic_error("Film: no half was kept apart.");
+double Film::deviations(float* mean, float* deviation, ThreadPool& pool) const {
+    if (layout_.marks == NONE) throw std::logic_error("Film: no marks were kept.");
+    std::atomic<u64> before{0}, all{0};
     pool.parallel_for(counts_.size(), 1024, [&](size_t begin, size_t end, unsigned) {
+        u64 own_before = 0, own_all = 0;
         for (size_t pixel = begin; pixel < end; ++pixel) {
-            const FilmSum* row = rows_.get() + pixel * layout_.stride;
-            const FilmSum *sum = row + layout_.combined, *other = row + layout_.half;
-            double samples = counts_[pixel], others = other[3], own = samples - others;
-            double scale = samples > 0.0 ? spec_.exposure / samples : 0.0;
-            // The mean of n = a + b samples errs by (a A + b B) / n, where A and B are the halves' errors, of
-            // variances v / a and v / b: by v / n, as (A - B) sqrt(ab) / n does.
-            double weight = own > 0.0 && others > 0.0 ? std::sqrt(own * others) / samples * spec_.exposure
-                                                      : std::numeric_limits<double>::quiet_NaN();
+            const FilmSum* sum = rows_.get() + pixel * layout_.stride + layout_.combined;
+            const FilmSum* mark = most_even_mark(rows_.get() + pixel * layout_.stride, layout_, counts_[pixel]);
+            double n = counts_[pixel], a = mark[3], b = n - a;
+            bool both = a > 0.0 && b > 0.0;
+            own_before += both ? u64(a) : 0u, own_all += both ? counts_[pixel] : 0u;
+            double scale = n > 0.0 ? spec_.exposure / n : 0.0;
+            // With independent samples of variance v, means of a and of b samples differ by v / a + v / b = v n / (ab),
+            // and the mean of all errs by v / n.
+            double weight = both ? std::sqrt(a * b) * scale : std::numeric_limits<double>::quiet_NaN();
             for (int k = 0; k < 3; ++k) {
                 mean[pixel * 3 + k] = to_float(sum[k] * scale);
-                double difference = ((sum[k] - other[k]) / own - other[k] / others) * weight;
-                deviation[pixel * 3 + k] = to_float(difference);
+                deviation[pixel * 3 + k] = to_float((mark[k] / a - (sum[k] - mark[k]) / b) * weight);
             }
         }
+        before += own_before, all += own_all;
     });
+    return all > 0 ? double(before) / double(all) : 0.0;
 }
 
 void Film::merge(const Film& other) {

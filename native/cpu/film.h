@@ -24,7 +24,7 @@ struct FilmSpec {
         bool color;
     };
     std::vector<Aov> aovs;
-    bool halves = false;  // keep the other half of Combined apart, for estimates of the error
+    bool marks = false;  // keep what the samples before powers of two added, for estimates of the error
 };
 
 // How a pass is read from its row.
@@ -38,7 +38,6 @@ enum class PassKind : u8 {
     MIST,          // 1 - mean
     SAMPLE_COUNT,
     CRYPTO,        // ids as they are, mean weights, sorted by weight
-    HALF,          // mean over the other half's samples, exposure
 };
 
 struct Pass {
@@ -66,10 +65,12 @@ class Film {
     // without samples are 0.
     void resolve(const std::vector<float*>& out, ThreadPool& pool) const;
 
-    // Combined without alpha and one draw of its error, from the difference of the halves: both height * width * 3
-    // floats, bottom row first. The square of a deviation has the expectation of the mean's squared error. NaN where
-    // a half has no samples. Throws std::logic_error for a film without halves.
-    void deviations(float* mean, float* deviation, ThreadPool& pool) const;
+    // Combined without alpha and one draw of its error, from the difference of the samples before and after a mark:
+    // both height * width * 3 floats, bottom row first. Were samples independent, the square of a deviation would have
+    // the expectation of the mean's squared error; parts of one sequence differ by more, which luch.accuracy takes
+    // out. NaN where a part has no samples. Returns the share of the samples that lie before the mark, 0 where no
+    // pixel has both parts. Throws std::logic_error for a film without marks.
+    double deviations(float* mean, float* deviation, ThreadPool& pool) const;
 
     // Adds what another film of the same layout holds, e.g. other samples of the same picture. What the
     // first sample sees is kept where this film has samples.

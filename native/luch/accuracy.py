@@ -1,9 +1,13 @@
-"""How far a picture is from the truth, told by two halves of its samples that were randomised apart.
+"""How far a picture is from the truth, told by two parts of its samples.
 
-With a and b the errors of two halves of equally many samples, the picture errs by (a + b) / 2, and the deviation
-d = (a - b) / 2 is what the film gives. As a and b are independent with mean 0, d^2 and the picture's squared error have
-one expectation, for any sampler and any distribution; they differ by ab. A path that only one half found enters both
-alike, so even an error made of a few bright pixels is told well, though the next picture's may be another.
+A render's samples are one Owen-scrambled sequence; its first 2^k and those after them are two parts. With a and b the
+errors of two parts of equally many samples, the picture errs by (a + b) / 2, and the deviation d = (a - b) / 2 is what
+the film gives. Were a and b independent, d^2 and the picture's squared error would have one expectation, for any
+sampler and any distribution; they would differ by ab. A path that only one part found enters both alike, so even an
+error made of a few bright pixels is told well, though the next picture's may be another. Parts of one sequence
+complement each other, so that d^2 is larger than the squared error by what `overstated` says; luch.curve takes that
+out with the rate that it finds. Two sequences scrambled apart would need no correction, but each would be worth less:
+measured, relMSE 4 to 10 % higher in a closed room and up to twice where edges decide (docs/accuracy.md).
 
 The measure: relMSE = mean((I - R)^2 / (|R| + 0.01)^2) over pixels and channels (Rousselle et al. 2011), R the truth;
 its square root is "the error". Samples are drawn by the pixel filter and count for one pixel alone, so neighbours are
@@ -12,10 +16,8 @@ not correlated by it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +31,14 @@ NORMAL_95 = 1.96  # standard deviations on either side that hold 95 % of a norma
 POOL_RADIUS = 3  # pixels; 7 x 7 neighbours share one variance
 NEAR = 1  # pixels; 3 x 3 neighbours tell how unevenly the error is spread
 GUIDE_RADIUS = 2  # pixels; how far neighbours may lie that say how bright the truth may be
+SURE = 0.25  # of a neighbour's brightness: deviations below tell that it is there
+EDGE_GAP = 4.0  # times as bright as its surroundings: a pixel that may lie on a bright neighbour's edge
 GAP_VARIANCES = 4.0  # a gap of two standard deviations to the neighbours may still be noise
 BAND, HALO = (
     64,
     POOL_RADIUS + GUIDE_RADIUS,
 )  # rows worked on together, small enough for a cache; rows they look at beside
 TILE = 16  # pixels; edge of the tiles whose sums of deviations are taken as independent
-PRIOR_RATE, PRIOR_SPREAD = 1.0, 0.1  # independent samples fall by 1 / n; well spread ones a little faster
-POINT_SPREAD = 0.05  # of the logarithm of a relMSE, beside its interval
 FIREFLIES = 0.001  # share of the pixels that are asked for their share of the error
 
 
@@ -52,9 +54,36 @@ class Estimate:
     brightness_low: float
     brightness_high: float
 
+    def scaled(self, factor: float, spread: float) -> Estimate:
+        """The errors times a factor whose logarithm is uncertain by so much (one standard deviation)."""
+        if not self.error > 0.0:
+            return self
+        ratio = float(np.exp(np.hypot(np.log(self.error_high / self.error), NORMAL_95 * spread)))
+        error = self.error * factor
+        return replace(self, error=error, error_low=error / ratio, error_high=error * ratio)
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the error's logarithm, as the interval has it."""
+        return float(np.log(self.error_high / self.error)) / NORMAL_95 if self.error > 0.0 else 0.0
+
     def statistics(self) -> dict[str, float]:
         """For JSON and headers of files."""
         return asdict(self)
+
+
+def overstated(share: float, rate: float) -> float:
+    """By how much the square of a deviation exceeds the squared error, where the first part of one sequence holds that
+    share of the samples and the relMSE of n samples falls as n^-rate, 1 <= rate < 2.
+
+    Sums of n samples then vary as n^(2 - rate), wherever in the sequence they begin, as increments of a fractional
+    Brownian motion do (Mandelbrot and Van Ness 1968); the covariance of two parts follows. share 0: of parts that are
+    independent, 1.
+    """
+    if not 0.0 < share < 1.0:
+        return 1.0
+    a, b, power = share, 1.0 - share, 2.0 - rate
+    return float(a * b * (a ** (power - 2.0) + b ** (power - 2.0)) + a**power + b**power - 1.0)
 
 
 def _sums(image: F64, radius: int, axis: int) -> F64:
@@ -104,6 +133,7 @@ def _truth_guesses(mean: F32, d: F64, known: F64) -> list[F32]:
     lit = box_sum((grey * grey).astype(np.float64))
     relative = np.divide(box_sum(noise.astype(np.float64)), lit, out=np.zeros_like(lit), where=lit > 0.0)
     noise = GAP_VARIANCES * np.maximum(noise, relative.astype(np.float32) * grey * grey)
+    beside = _beside_bright(grey, np.abs(d).mean(axis=2).astype(np.float32))
     total, weights = np.zeros_like(mean), np.zeros_like(grey)
     height, width = grey.shape
     guesses = []
@@ -114,8 +144,25 @@ def _truth_guesses(mean: F32, d: F64, known: F64) -> list[F32]:
             alike = ((grey[here] - grey[there]) ** 2 <= noise[here] + noise[there]) & (known[there][..., 0] > 0.0)
             weights[here] += alike
             total[here] += alike[..., None] * mean[there]
-        guesses.append(np.where(weights[..., None] > 0.5, total / np.maximum(weights, 1.0)[..., None], mean))
+        guess = np.where(weights[..., None] > 0.5, total / np.maximum(weights, 1.0)[..., None], mean)
+        edge = beside[..., None] & (mean > EDGE_GAP * guess)
+        guesses.append(np.where(edge, mean, guess))
     return guesses
+
+
+def _beside_bright(grey: F32, deviation: F32) -> NDArray[np.bool_]:
+    """Pixels that touch a surely brighter one, (H, W). What makes them bright may be its edge, seen by few samples.
+
+    Against dark neighbours alone, a lamp's edge would count as a firefly whose error is a thousand times the truth.
+    """
+    sure = np.where(deviation <= SURE * grey, grey, np.float32(0.0))
+    brightest = np.zeros_like(grey)
+    height, width = grey.shape
+    for dy, dx in _ring(1):
+        here = slice(max(0, -dy), max(0, height - dy)), slice(max(0, -dx), max(0, width - dx))
+        there = slice(max(0, dy), max(0, height + dy)), slice(max(0, dx), max(0, width + dx))
+        np.maximum(brightest[here], sure[there], out=brightest[here])
+    return np.asarray(brightest >= grey)
 
 
 def _ring(radius: int) -> list[tuple[int, int]]:
@@ -214,49 +261,3 @@ def percent(fraction: float, digits: int = 2) -> str:
     if not fraction > 0.0:
         return "0"
     return f"{100.0 * fraction:.{max(0, digits - 1 - int(np.floor(np.log10(100.0 * fraction))))}f}"
-
-
-def describe(stats: Mapping[str, Any]) -> str:
-    """For people, from a render's statistics: "error 1.8 % (1.7 to 1.9 %); 1 % would take 41 s more"."""
-    low, high = percent(stats["error_low"]), percent(stats["error_high"])
-    text = f"error {percent(stats['error'])} % ({low} to {high} %)"
-    if "seconds_to_next_error" in stats:
-        text += f"; {stats['next_error'] * 100:g} % would take {stats['seconds_to_next_error']:.2g} s more"
-    return text
-
-
-class Curve:
-    """Errors of one render at growing numbers of samples, and what they say of the time that less error takes."""
-
-    def __init__(self) -> None:
-        self.points: list[tuple[int, float, Estimate]] = []  # samples, seconds
-
-    def add(self, samples: int, seconds: float, found: Estimate) -> None:
-        """samples and seconds must grow from call to call."""
-        self.points.append((samples, seconds, found))
-
-    def rate(self) -> float:
-        """p of relMSE ~ samples^-p: a line through the points, each as sure as its interval, and p = 1 beforehand."""
-        told = [point for point in self.points if point[2].error > 0.0]
-        moment, weight = PRIOR_RATE / PRIOR_SPREAD**2, PRIOR_SPREAD**-2
-        if len(told) > 1:
-            x = np.log([samples for samples, _, _ in told])
-            y = 2.0 * np.log([found.error for _, _, found in told])
-            spread = np.log([found.error_high / found.error_low for _, _, found in told]) / NORMAL_95
-            w = 1.0 / (spread**2 + POINT_SPREAD**2)
-            x, y = x - np.average(x, weights=w), y - np.average(y, weights=w)
-            moment, weight = moment - float(np.sum(w * x * y)), weight + float(np.sum(w * x * x))
-        return float(np.clip(moment / weight, 0.5, 2.0))
-
-    def seconds_to(self, error: float) -> float:
-        """Seconds beyond the last point until the error is that small; 0 if it is, inf while nothing is known."""
-        if not self.points or not error > 0.0:
-            return float("inf")
-        _, seconds, found = self.points[-1]
-        return float(seconds * max(0.0, (found.error / error) ** (2.0 / self.rate()) - 1.0))
-
-
-def next_target(error: float) -> float:
-    """The next smaller error of 1, 2 or 5 times a power of ten that is worth going for: 0.018 -> 0.01."""
-    decade = 10.0 ** np.floor(np.log10(0.8 * error))
-    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= 0.8 * error * (1.0 + 1e-9)))

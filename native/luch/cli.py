@@ -20,6 +20,7 @@ from luch.cuda import DeviceError
 from luch.effects import effects_of, summary
 from luch.scene import Scene
 from luch.scenefile import read_scene
+from luch.stopping import UNLIMITED_SAMPLES
 
 if TYPE_CHECKING:
     from luch.render import Progress, Result
@@ -48,7 +49,17 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("-o", "--output", type=Path, required=True, help="PATH.exr (all passes) or PATH.png (Combined)")
     render.add_argument("--samples", type=_positive(int), help="samples per pixel (default: the scene's)")
     render.add_argument("--time", type=_positive(float), metavar="S", help="stop after this many seconds")
+    render.add_argument(
+        "--error",
+        type=_positive(float),
+        metavar="E",
+        help="stop when the picture's error is that small, e.g. 0.01; without --samples, however many samples it takes",
+    )
     render.add_argument("--seed", type=int, help="seed of the sampler")
+    render.add_argument("--first-sample", type=int, metavar="N", help="leave out N samples that another render takes")
+    render.add_argument(
+        "--samples-in-all", type=int, metavar="N", help="samples of all renders that are to be merged with this one"
+    )
     render.add_argument(
         "--device", type=str.upper, choices=("CPU", "CUDA"), help="what computes (default: the scene's)"
     )
@@ -122,15 +133,21 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _told_error(result: Result) -> str:
-    from luch.accuracy import describe
+    from luch.curve import describe
 
     return f", {describe(result.stats)}" if "error" in result.stats else ""
 
 
 def _override(scene: Scene, options: argparse.Namespace) -> None:
     settings = scene.settings
+    if options.error is not None:
+        settings.error_limit, settings.samples = options.error, UNLIMITED_SAMPLES
     if options.samples is not None:
         settings.samples = options.samples
+    if options.first_sample is not None:
+        settings.first_sample = options.first_sample
+    if options.samples_in_all is not None:
+        settings.samples_in_all = options.samples_in_all
     if options.time is not None:
         settings.time_limit = options.time
     if options.seed is not None:

@@ -7,8 +7,8 @@
 
 from __future__ import annotations
 
+import os
 import resource
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -19,19 +19,21 @@ import numpy as np
 
 from luch import accuracy
 from luch._native import core
+from luch.curve import Curve, Forecast, next_target
 from luch.effects import effects_of
 from luch.effects.removal import without
-from luch.scene import F32, Film, Scene
+from luch.scene import F32, Film, Scene, Settings
+from luch.stopping import Stopping
+from luch.watching import watched
 
-# A step is watched this often: what a cancel waits for at most, beside one batch of paths.
-WATCH_SECONDS = 0.1
 # Steps grow until one takes about this long; longer steps show the picture too seldom.
 STEP_SECONDS = 4.0
-# The error is looked at from so many samples on, where that takes at most this share of the time so far. A look
-# takes about so many seconds a pixel (one processor of 2024).
-FIRST_LOOK = 8
-LOOK_SHARE = 0.01
+# The error is looked at where that takes at most this share of the time so far: of all time 2 %, as looks lie a third
+# to a half apart. A look takes about so many seconds a pixel on one processor of 2024, until one was measured.
+LOOK_SHARE = 0.007
 LOOK_SECONDS = 1.2e-6
+# What reading passes takes at the end of a render that may only take so long; seconds a pixel and channel.
+PASS_SECONDS = 4e-9
 # The standard error of Combined, (H, W, 3), in its unit.
 ERROR_PASS = "Error"
 # Where fewer than two samples tell nothing: files and compositors bear no infinity well.
@@ -51,6 +53,9 @@ class Progress:
     new_picture: bool  # a step has ended since the last call: passes() shows more than before
     passes: Callable[[], dict[str, F32]]
     error: float | None = None  # of the picture at the last look, as in luch.accuracy
+    asked_error: float = 0.0  # 0: none
+    forecast: Forecast | None = None  # of the error asked for, else of the next round one
+    curve: Curve | None = None
     preparing: bool = False  # structures and lights are being built; no sample was traced yet
 
 
@@ -73,70 +78,18 @@ def peak_memory_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-class _Work(threading.Thread):
-    """One call of the native renderer, so that the caller's thread can watch and cancel."""
-
-    def __init__(self, work: Callable[[], object]) -> None:
-        super().__init__(daemon=True)
-        self._work = work
-        self.error: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            self._work()
-        except BaseException as error:  # handed to the caller's thread, which raises it
-            self.error = error
-
-
-def _watched(work: Callable[[], object], renderer: Any, goes_on: Callable[[], bool]) -> bool:
-    """Does `work` on a thread of its own and asks `goes_on` meanwhile; on the first no, cancels the renderer.
-
-    Returns whether it ran to its end uncancelled. No thread outlives this call.
-    """
-    thread = _Work(work)
-    asked_to_go_on = True
-    thread.start()
-    try:
-        while thread.is_alive():
-            thread.join(WATCH_SECONDS)
-            if thread.is_alive() and asked_to_go_on and not goes_on():
-                asked_to_go_on = False
-                renderer.cancel()
-    except BaseException:  # Ctrl-C, or the caller's own
-        renderer.cancel()
-        thread.join()
-        raise
-    if thread.error is not None:
-        raise thread.error
-    return asked_to_go_on
-
-
-def _next_count(done: int, total: int, seconds: float) -> int:
-    """Samples of the next step: doubling, bounded by what STEP_SECONDS allow and by what is left."""
+def _next_count(done: int, next_look: int, seconds: float) -> int:
+    """Samples of the next step: doubling, bounded by what STEP_SECONDS allow and by the next look."""
     if done == 0:
         return 1
     by_time = max(1, int(STEP_SECONDS * done / max(seconds, 1e-6)))
-    return max(1, min(done, by_time, total - done))
+    return max(1, min(done, by_time, next_look - done))
 
 
 def film_pixels(film: Film) -> int:
     """Pixels of the rendered region."""
     x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
     return (x1 - x0) * (y1 - y0)
-
-
-def _told_by(curve: accuracy.Curve) -> dict[str, Any]:
-    """Statistics of the error; none where nothing is known."""
-    if not curve.points:
-        return {}
-    found = curve.points[-1][2]
-    told: dict[str, Any] = dict(found.statistics())
-    told["error_curve"] = [[samples, round(seconds, 3), point.error] for samples, seconds, point in curve.points]
-    told["error_rate"] = curve.rate()
-    if found.error > 0.0:
-        told["next_error"] = accuracy.next_target(found.error)
-        told["seconds_to_next_error"] = curve.seconds_to(told["next_error"])
-    return told
 
 
 def _renderer_for(scene: Scene) -> tuple[Any, list[str]]:
@@ -154,8 +107,132 @@ def _renderer_for(scene: Scene) -> tuple[Any, list[str]]:
         return core.render.Renderer(scene), [f"Rendered on the CPU: {error}"]
 
 
+class _Loop:
+    """One render while it grows: steps, looks, and what ends it."""
+
+    def __init__(self, renderer: Any, scene: Scene, settings: Settings, progress: Callable[[Progress], bool] | None,
+                 start: float) -> None:  # fmt: skip
+        self.renderer, self.settings, self.progress, self.start = renderer, settings, progress, start
+        self.curve = Curve()
+        self.stopping = Stopping(max(1, settings.samples), settings.error_limit)
+        self.done = 0
+        self.prepared = start
+        self.cancelled = self.timed_out = False
+        pixels = film_pixels(scene.film)
+        self._look_cost = LOOK_SECONDS * pixels / max(1, os.cpu_count() or 1) if settings.estimate_error else 0.0
+        self._passes_cost = PASS_SECONDS * pixels * (4 + 3 * len(scene.film.passes))
+
+    @property
+    def seconds(self) -> float:
+        """Of rendering: since structures and lights were built."""
+        return time.perf_counter() - self.prepared
+
+    def prepare(self) -> None:
+        """Structures and lights."""
+
+        def goes_on() -> bool:
+            return self.progress is None or self.progress(_preparing(self.stopping.samples, self.start))
+
+        self.cancelled = not watched(self.renderer.prepare, self.renderer, goes_on)
+        self.prepared = time.perf_counter()
+
+    def seconds_left(self) -> float:
+        """For tracing: the last look and the passes come out of the limit too, and so did building."""
+        if not self.settings.time_limit > 0.0:
+            return float("inf")
+        ends = self.start + self.settings.time_limit - self._look_cost - self._passes_cost
+        return ends - time.perf_counter()
+
+    def run(self) -> None:
+        """Until a limit is reached or the caller says no. There is at least one sample, however short the time."""
+        while self.done < self.stopping.samples and not (self.cancelled or self.timed_out or self.stopping.reached):
+            self._step(_next_count(self.done, self.stopping.next_look(self.done), self.seconds))
+        self.render_seconds = self.seconds
+        self._look(last=True)
+
+    def _step(self, count: int) -> None:
+        first = self.done
+
+        def goes_on() -> bool:
+            self.timed_out = first > 0 and self.seconds_left() <= 0.0
+            self.cancelled = not self._tell(first, count, False)
+            return not (self.cancelled or self.timed_out)
+
+        left = self.seconds_left if first > 0 else lambda: float("inf")
+        start = self.settings.first_sample
+        watched(partial(self.renderer.render, start + first, count), self.renderer, goes_on, left)
+        if self.cancelled or self.timed_out:
+            return
+        self.done += count
+        self.timed_out = self.seconds_left() <= 0.0
+        if not self.timed_out:
+            self._look(last=False)
+        self.cancelled = not self._tell(self.done, 0, True)
+
+    def _look(self, last: bool) -> None:
+        """A point of the curve: where the rule of stopping wants one and it costs next to nothing, and at the end."""
+        points = self.curve.points
+        seen = bool(points) and points[-1][0] == self.done
+        if last and seen and (self.cancelled or self.timed_out):
+            points.pop()  # the film may hold more since: parts of a step that was cut off
+        elif seen:
+            return
+        due = self.done == self.stopping.next_look(self.done - 1) and self._look_cost <= LOOK_SHARE * self.seconds
+        asked = self.done == self.stopping.settled
+        if not self.settings.estimate_error or not (last or due or asked):
+            return
+        began = time.perf_counter()
+        mean, deviation, share = self.renderer.deviations()
+        found = accuracy.estimate(mean, deviation)
+        self._look_cost = time.perf_counter() - began
+        if found is not None:
+            self.curve.add(self.done, self.seconds, found, share)
+            self.stopping.look(self.curve)
+
+    def _fraction(self, samples: float) -> float:
+        """Of the whole work: whichever end is nearer."""
+        fraction = samples / self.stopping.samples
+        if self.settings.time_limit > 0.0:
+            fraction = max(fraction, (time.perf_counter() - self.start) / self.settings.time_limit)
+        if self.settings.error_limit > 0.0 and self.curve.points:
+            whole = self.curve.points[-1][0] + self.curve.forecast(self.settings.error_limit).samples
+            fraction = max(fraction, samples / max(whole, samples))
+        return min(fraction, 1.0)
+
+    def _tell(self, first: int, count: int, new_picture: bool) -> bool:
+        if self.progress is None:
+            return True
+        seconds = self.seconds
+        fraction = self._fraction(first + count * (0.0 if new_picture else self.renderer.step_progress()))
+        remaining = seconds * (1.0 - fraction) / fraction if fraction > 0.0 else float("inf")
+        found = self.curve.last
+        aim = self.settings.error_limit or (next_target(found.error) if found and found.error > 0.0 else 0.0)
+        return self.progress(
+            Progress(
+                first,
+                self.stopping.samples,
+                fraction,
+                seconds,
+                max(remaining, 0.0),
+                peak_memory_bytes(),
+                new_picture,
+                self.renderer.passes,
+                error=found.error if found else None,
+                asked_error=self.settings.error_limit,
+                forecast=self.curve.forecast(aim) if found else None,
+                curve=self.curve,
+            )
+        )
+
+    def stopped_by(self) -> str:
+        """ "cancel", "error", "time" or "samples"."""
+        if self.cancelled:
+            return "cancel"
+        return "error" if self.stopping.reached else "time" if self.timed_out else "samples"
+
+
 def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) -> Result:
-    """Renders ``scene`` as its settings say, until its samples or its time limit are reached.
+    """Renders ``scene`` as its settings say, until its samples, its time limit or the error asked for are reached.
 
     progress is called about ten times a second and at the end of every step; returning False cancels,
     and the film so far is returned (``Result.cancelled``). Raises ValueError for a scene that does not
@@ -164,95 +241,38 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     start = time.perf_counter()
     effects = effects_of(scene).as_dict()
     scene = without(scene, scene.settings.without_effects)
-    wants_error = ERROR_PASS in scene.film.passes and ERROR_PASS not in (name for name, _ in scene.film.aovs)
-    settings = replace(scene.settings, estimate_error=scene.settings.estimate_error or wants_error)
-    film = replace(scene.film, passes=[name for name in scene.film.passes if name != ERROR_PASS])
-    traced = replace(scene, film=film, settings=settings)
+    own = [name for name in scene.film.passes if name != ERROR_PASS or name in (aov for aov, _ in scene.film.aovs)]
+    wants_error = len(own) < len(scene.film.passes)
+    settings = scene.settings
+    if wants_error or settings.error_limit > 0.0:
+        settings = replace(settings, estimate_error=True)
+    traced = replace(scene, film=replace(scene.film, passes=own), settings=settings)
     renderer, warnings = _renderer_for(traced)
-    total = max(1, settings.samples)
-    cancelled = not _watched(renderer.prepare, renderer, lambda: progress is None or progress(_preparing(total, start)))
-    prepared = time.perf_counter()
-    done = 0
-
-    def tell(first: int, count: int, new_picture: bool) -> bool:
-        if progress is None:
-            return True
-        seconds = time.perf_counter() - prepared
-        work = first + count * (0.0 if new_picture else renderer.step_progress())
-        fraction = work / total
-        if settings.time_limit > 0.0:
-            fraction = max(fraction, seconds / settings.time_limit)
-        remaining = seconds * (1.0 - fraction) / fraction if fraction > 0.0 else float("inf")
-        return progress(
-            Progress(
-                first,
-                total,
-                min(fraction, 1.0),
-                seconds,
-                max(remaining, 0.0),
-                peak_memory_bytes(),
-                new_picture,
-                renderer.passes,
-                error=curve.points[-1][2].error if curve.points else None,
-            )
-        )
-
-    def out_of_time() -> bool:
-        return settings.time_limit > 0.0 and time.perf_counter() - prepared >= settings.time_limit
-
-    curve = accuracy.Curve()
-
-    def look(last: bool) -> None:
-        """A point of the curve: at every doubling of the samples, where it costs next to nothing, and at the end."""
-        seconds = time.perf_counter() - prepared
-        due = done >= 2 * curve.points[-1][0] if curve.points else done >= FIRST_LOOK
-        cheap = LOOK_SECONDS * film_pixels(scene.film) <= LOOK_SHARE * seconds
-        seen = bool(curve.points) and curve.points[-1][0] == done
-        if last and seen and done < total:
-            curve.points.pop()  # the film holds more since: parts of a step that was cut off
-        elif seen:
-            return
-        if settings.estimate_error and (last or (due and cheap)):
-            found = accuracy.estimate(*renderer.deviations())
-            if found is not None:
-                curve.add(done, seconds, found)
-
-    timed_out = False
-    while done < total and not cancelled and not timed_out:
-        count = _next_count(done, total, time.perf_counter() - prepared)
-
-        def goes_on(first: int = done, count: int = count) -> bool:
-            nonlocal cancelled, timed_out
-            timed_out = out_of_time() and first > 0
-            cancelled = not tell(first, count, False)
-            return not (cancelled or timed_out)
-
-        _watched(partial(renderer.render, done, count), renderer, goes_on)
-        if not cancelled and not timed_out:
-            done += count
-            timed_out = out_of_time()
-            look(False)
-            cancelled = not tell(done, 0, True)
-    render_seconds = time.perf_counter() - prepared
-    look(True)
+    loop = _Loop(renderer, scene, settings, progress, start)
+    loop.prepare()
+    loop.run()
     stats = dict(renderer.stats())
     stats.update(
-        samples=done,
-        samples_asked=total,
-        prepare_seconds=prepared - start,
-        render_seconds=render_seconds,
+        samples=loop.done,
+        samples_asked=loop.stopping.samples,
+        first_sample=settings.first_sample,
+        error_asked=settings.error_limit,
+        time_asked=settings.time_limit,
+        prepare_seconds=loop.prepared - start,
+        render_seconds=loop.render_seconds,
         seed=settings.seed,
         device=getattr(renderer, "device", "CPU"),
         instruction_set=core.__name__.rsplit("_", 1)[-1],
         peak_memory_bytes=peak_memory_bytes(),
-        cancelled=cancelled,
-        stopped_by="cancel" if cancelled else "time" if timed_out else "samples",
+        cancelled=loop.cancelled,
+        stopped_by=loop.stopped_by(),
         warnings=[*scene.warnings, *warnings, *getattr(renderer, "warnings", [])],
         effects=effects,
     )
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
-    stats.update(_told_by(curve))
+    stats.update(loop.curve.statistics())
     if wants_error:
         error = accuracy.standard_error(renderer.deviations()[1])
         passes[ERROR_PASS] = np.where(np.isfinite(error), error, UNKNOWN_ERROR)
-    return Result(passes, stats, cancelled)
+    stats["total_seconds"] = time.perf_counter() - start
+    return Result(passes, stats, loop.cancelled)

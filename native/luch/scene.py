@@ -204,8 +204,12 @@ class Settings:
     """What trades accuracy for time. Defaults take nothing away from the light."""
 
     samples: int = 128
-    time_limit: float = 0.0  # seconds, 0: none
+    time_limit: float = 0.0  # seconds with building and writing of the film, 0: none
+    error_limit: float = 0.0  # the render ends when its error is that small (luch.accuracy), 0: none
     seed: int = 0
+    # Several renders of one seed, each with samples of its own, merge into one (luch.merge).
+    first_sample: int = 0
+    samples_in_all: int = 0  # of all those renders; 0: no others follow
     threads: int = 0  # 0: all
     max_bounces: int = 12
     diffuse_bounces: int = 4
@@ -231,7 +235,7 @@ class Settings:
     # forces every effect that can be.
     without_effects: list[str] = field(default_factory=list)
     force_effects: list[str] = field(default_factory=list)
-    estimate_error: bool = True  # two independent sequences a pixel, whose difference tells the picture's error
+    estimate_error: bool = True  # keep marks in the film, whose differences tell the picture's error
     ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
 
 

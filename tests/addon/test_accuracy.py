@@ -42,7 +42,7 @@ def shoot(scene: Scene, samples: int, seed: int = 0, threads: int = 0, halves: b
 def test_renders_know_their_error(exported: Scene) -> None:
     reference = shoot(exported, REFERENCE_SAMPLES, 1000).passes["Combined"]
     covered, ratios = [], []
-    for samples, seeds in ((16, 10), (33, 6)):
+    for samples, seeds in ((32, 8), (72, 8)):
         for seed in range(seeds):
             result = shoot(exported, samples, seed)
             stats = result.stats
@@ -50,25 +50,38 @@ def test_renders_know_their_error(exported: Scene) -> None:
             covered.append(stats["error_low"] <= error <= stats["error_high"])
             ratios.append((stats["error"] / error) ** 2)
             assert stats["brightness_low"] < stats["brightness"] < stats["brightness_high"]
-    assert np.mean(covered) >= 0.8  # 16 renders, and a reference with noise of its own
+    assert np.mean(covered) >= 0.75  # 16 renders, and a reference with noise of its own
     # A thousand pixels, a few of which carry most of the noise: single pictures scatter by a fifth.
-    assert 0.9 < np.median(ratios) < 1.12 and np.mean([0.8 <= ratio <= 1.25 for ratio in ratios]) >= 0.7
+    assert 0.85 < np.median(ratios) < 1.18 and np.mean([0.8 <= ratio <= 1.25 for ratio in ratios]) >= 0.6
 
 
-def test_one_sequence_is_as_before_and_says_nothing_of_its_error(exported: Scene) -> None:
-    one, two = (shoot(exported, 8, halves=halves) for halves in (False, True))
-    assert "error" not in one.stats and 0.0 < two.stats["error_low"] < two.stats["error"]
-    assert "error" not in shoot(exported, 1).stats, "one sample has no other half"
-    first, second = shoot(exported, 1, halves=False), shoot(exported, 1)
-    assert np.array_equal(first.passes["Combined"], second.passes["Combined"])
-    assert list(two.passes) == list(one.passes)
+def test_the_estimate_changes_no_pixel(exported: Scene) -> None:
+    without, known = (shoot(exported, 8, halves=halves) for halves in (False, True))
+    assert "error" not in without.stats and 0.0 < known.stats["error_low"] < known.stats["error"]
+    assert "error" not in shoot(exported, 1).stats, "one sample has no other part"
+    assert list(known.passes) == list(without.passes)
+    assert without.passes["Combined"].tobytes() == known.passes["Combined"].tobytes()
+
+
+def test_a_render_ends_at_the_error_asked_for(exported: Scene) -> None:
+    reference = shoot(exported, REFERENCE_SAMPLES, 1000).passes["Combined"]
+    exported.settings.error_limit = 0.04
+    met = []
+    for seed in range(6):
+        result = shoot(exported, 4096, seed)
+        assert result.stats["stopped_by"] == "error" and result.stats["error"] <= 0.04
+        assert 16 <= result.stats["samples"] < 512
+        met.append(0.7 <= np.sqrt(rel_mse(result.passes["Combined"], reference)) / 0.04 <= 1.1)
+    assert np.mean(met) >= 0.8  # of 6
+    exported.settings.error_limit = 1e-5
+    assert shoot(exported, 32).stats["stopped_by"] == "samples"
 
 
 def test_the_error_does_not_depend_on_threads(exported: Scene) -> None:
     one, many = (shoot(exported, 12, threads=threads) for threads in (1, 3))
     assert one.passes["Combined"].tobytes() == many.passes["Combined"].tobytes()
     assert one.stats["error"] == many.stats["error"]
-    assert one.stats["error_curve"][-1][::2] == [12, one.stats["error"]]
+    assert one.stats["error_curve"][-1][:3:2] == [12, one.stats["error"]]
     assert one.stats["next_error"] < one.stats["error"] and one.stats["seconds_to_next_error"] > 0.0
 
 

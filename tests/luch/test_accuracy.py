@@ -111,19 +111,22 @@ def test_tiny_pictures_have_an_error_too(size: tuple[int, int]) -> None:
     assert found is not None and found.error == pytest.approx(0.1 / 1.01, rel=1e-5)
 
 
-def test_people_read_two_digits() -> None:
-    stats = {"error": 0.01834, "error_low": 0.0171, "error_high": 0.1234}
-    assert accuracy.describe(stats) == "error 1.8 % (1.7 to 12 %)"
-    assert (accuracy.percent(0.0), accuracy.percent(1.52), accuracy.percent(0.000456)) == ("0", "152", "0.046")
+def test_a_lamps_edge_is_no_firefly() -> None:
+    """A pixel that one sample in a hundred sees bright, beside a bright lamp: its truth is bright, not dark."""
+    mean = np.full((SIZE, SIZE, 3), 0.05, np.float32)
+    mean[:, 20:] = 100.0
+    deviation = 0.02 * mean
+    mean[10, 19] = deviation[10, 19] = 2.0
+    edge = accuracy.estimate(mean, deviation)
+    mean[10, 19], deviation[10, 19] = 0.05, 0.001
+    mean[10, 9] = deviation[10, 9] = 2.0
+    firefly = accuracy.estimate(mean, deviation)
+    assert edge is not None and firefly is not None
+    assert edge.error < 0.05 and firefly.error > 0.3
 
 
-def test_the_curve_foretells_the_time_to_less_error() -> None:
-    curve = accuracy.Curve()
-    assert curve.seconds_to(0.01) == float("inf") and curve.rate() == 1.0
-    for n in (8, 16, 32, 64, 128):
-        error = 0.5 * n**-0.6
-        curve.add(n, 0.1 * n, accuracy.Estimate(error, error / 1.02, error * 1.02, 0.0, 1.0, 1.0, 1.0))
-    assert curve.rate() == pytest.approx(1.2, abs=0.02)
-    assert curve.seconds_to(error / 2) == pytest.approx(12.8 * (2 ** (1 / 0.6) - 1), rel=0.05)
-    assert curve.seconds_to(2 * error) == 0.0
-    assert [accuracy.next_target(e) for e in (0.018, 0.0125, 0.9, 0.6)] == pytest.approx([0.01, 0.01, 0.5, 0.2])
+def test_parts_of_one_sequence_overstate_by_their_rate() -> None:
+    assert all(accuracy.overstated(share, 1.0) == pytest.approx(1.0) for share in (0.1, 0.5, 0.7))
+    assert accuracy.overstated(0.5, 1.1) == pytest.approx(2.0**1.1 - 1.0)
+    assert accuracy.overstated(0.3, 1.2) == pytest.approx(accuracy.overstated(0.7, 1.2))
+    assert accuracy.overstated(0.0, 1.2) == 1.0  # independent parts

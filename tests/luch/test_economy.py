@@ -69,7 +69,7 @@ def test_a_scene_of_plain_surfaces_and_a_point_lamp_does_nothing_else() -> None:
     stats, _ = rendered(room())
     idle = ("lens_samples", "lamp_searches", "transparent_steps", "world_points", "light_points")
     assert {name: stats[name] for name in idle} == dict.fromkeys(idle, 0)
-    assert stats["film_pixel_bytes"] == (4 + 4) * 8 + 4  # Combined, the half kept apart, the count of samples
+    assert stats["film_pixel_bytes"] == (4 + 2 * 4) * 8 + 4  # Combined, two marks, the count of samples
     assert stats["paths"] == PATHS
     assert stats["shadow_rays"] <= stats["surface_points"], "one light, one shadow ray at a point"
 

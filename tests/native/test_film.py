@@ -163,29 +163,35 @@ def test_cryptomatte_sorts_ids_by_weight_and_the_last_slot_takes_the_rest() -> N
     np.testing.assert_allclose(layers, [6, 0.4, 5, 0.3, 7, 0.2, 8, 0.1], rtol=1e-6)
 
 
-def test_two_halves_are_two_means() -> None:
-    film = core.film.Film(SMALL, halves=True)
-    feed(film, "Combined", [[1, 1, 1], [3, 3, 3]])
-    feed(film, "Combined Half", [[3, 3, 3]])
-    film.count_samples(0, 1)
-    film.count_samples(0, 1, other_half=True)
-    out = film.resolve()
-    assert out["Combined"][0, 0, 0] == 2 and out["Combined Half"][0, 0, 0] == 3
-
-
-def test_deviations_weigh_uneven_halves_by_their_samples() -> None:
-    film = core.film.Film(SMALL, halves=True)
-    feed(film, "Combined", [[1, 0, 0], [2, 0, 0], [3, 0, 0], [6, 0, 1]])
-    feed(film, "Combined Half", [[6, 0, 1]])
+def test_deviations_weigh_uneven_parts_by_their_samples() -> None:
+    film = core.film.Film(SMALL, marks=True)
+    feed(film, "Combined", [[1, 0, 0], [2, 0, 0], [3, 0, 0]])
     film.count_samples(0, 3)
-    film.count_samples(0, 1, other_half=True)
-    mean, deviation = film.deviations()
-    assert mean[0, 0].tolist() == [3, 0, 0.25]
-    # Halves of 2 and 6; variances v / 3 and v / 1 differ by 4 v / 3, and the mean of four has v / 4.
+    film.mark(0, 4)  # before what would be the fifth sample: a part of 3
+    feed(film, "Combined", [[6, 0, 1]])
+    film.count_samples(0, 1)
+    mean, deviation, share = film.deviations()
+    assert mean[0, 0].tolist() == [3, 0, 0.25] and share == 0.75
+    # Parts of means 2 and 6; variances v / 3 and v / 1 differ by 4 v / 3, and the mean of four has v / 4.
     np.testing.assert_allclose(deviation[0, 0], [(2 - 6) * np.sqrt(3) / 4, 0, -np.sqrt(3) / 4], rtol=1e-6)
     assert np.isnan(deviation[0, 1]).all(), "no sample, no error"
-    with pytest.raises(RuntimeError, match="no half"):
+    with pytest.raises(RuntimeError, match="no marks"):
         make().deviations()
+
+
+def test_of_two_marks_the_one_counts_that_leaves_more_even_parts() -> None:
+    film = core.film.Film(SMALL, marks=True)
+    shares = []
+    for sample in range(64):
+        if sample and sample & (sample - 1) == 0:
+            film.mark(0, sample)
+        feed(film, "Combined", [[1, 1, 1]])
+        film.count_samples(0, 1)
+        if sample:
+            shares.append(film.deviations()[2])
+    assert shares[0] == 0.5 and shares[62] == 0.5
+    assert shares[32 - 1] == pytest.approx(16 / 33) and shares[48 - 2] == pytest.approx(32 / 48)
+    assert all(1 / 3 <= share <= 2 / 3 for share in shares)
 
 
 def test_merged_films_equal_one_film() -> None:

@@ -77,12 +77,13 @@ void Batch::trace(const PixelBlock& block) {
 
 void Batch::generate(const PixelBlock& block) {
     ray_count_ = 0;
-    u32 others = other_half_samples(scene_, block.first_sample, block.sample_count);
     for (int y = 0; y < block.height; y++) {
         for (int x = 0; x < block.width; x++) {
             u32 px = u32(block.x0 + x), py = u32(block.y0 + y);
-            film_count_samples(writer_, film_pixel(writer_.film, px, py), block.sample_count, others);
-            PixelSequences pixel = make_pixel_sequences(px, py, scene_.seed, scene_.log2_samples, scene_.halves);
+            u32 row = film_pixel(writer_.film, px, py);
+            if (is_mark(block.first_sample)) film_mark(writer_, row, block.first_sample);
+            film_count_samples(writer_, row, block.sample_count);
+            PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples);
             for (u32 s = 0; s < block.sample_count; s += CAMERA_LANES) {
                 u32 count = std::min(u32(CAMERA_LANES), block.sample_count - s);
                 generate_pixel(pixel, px, py, block.first_sample + s, count);
@@ -92,7 +93,7 @@ void Batch::generate(const PixelBlock& block) {
     counts_.paths += u64(ray_count_);
 }
 
-void Batch::generate_pixel(const PixelSequences& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
+void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
     // Random numbers first, of all samples: that loop vectorises.
     float filter_u[2][CAMERA_LANES], lens_u[2][CAMERA_LANES] = {};
     for (u32 i = 0; i < count; i++) {

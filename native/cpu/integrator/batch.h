@@ -49,7 +49,7 @@ class Batch {
  private:
     // batch.cpp: the wavefront
     void generate(const PixelBlock& block);
-    void generate_pixel(const PixelSequences& pixel, u32 px, u32 py, u32 first_sample, u32 count);
+    void generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count);
     void traverse();
     void meet_lamps();
     void shade_misses();

@@ -70,8 +70,8 @@ void Renderer::build_all() {
     scene_.filter = &scene_.filter_table;
     scene_.limits = input_.limits;
     scene_.seed = input_.seed;
-    scene_.log2_samples = ceil_log2(input_.samples);
-    scene_.halves = input_.film.halves;
+    scene_.first_sample = input_.first_sample;
+    scene_.log2_samples = ceil_log2(std::max(input_.samples_in_all, input_.first_sample + input_.samples));
     scene_.has_lens = input_.camera.aperture_radius > 0.0f || input_.forced.lens;
     scene_.mist_start = input_.mist_start;
     scene_.mist_inverse_depth = input_.mist_depth > 0.0f ? 1.0f / input_.mist_depth : 0.0f;
@@ -278,7 +278,7 @@ bool Renderer::render(u32 first, u32 count) {
             for (u32 done = 0; done < count; done += block.sample_count) {
                 if (cancelled_.load(std::memory_order_relaxed)) return;
                 block.first_sample = first + done;
-                block.sample_count = std::min(SAMPLES_PER_BATCH, count - done);
+                block.sample_count = std::min(SAMPLES_PER_BATCH, samples_to_mark(first + done, count - done));
                 batches_[worker]->trace(block);
             }
             tiles_done_.fetch_add(1, std::memory_order_relaxed);

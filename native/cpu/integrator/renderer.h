@@ -45,6 +45,7 @@ struct RenderInput {
     PathLimits limits{};
     FilmSpec film;
     u32 seed = 0, samples = 1;
+    u32 first_sample = 0, samples_in_all = 0;  // as luch.scene.Settings has them
     unsigned threads = 0;
     ForcedWork forced;
     float mist_start = 0.0f, mist_depth = 25.0f, mist_exponent = 2.0f;

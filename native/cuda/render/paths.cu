@@ -25,9 +25,9 @@ extern "C" __global__ void begin_paths(const __grid_constant__ luch::RenderTask 
     u32 slot = layer * task.wave.layer_pixels + within, sample = range.first_sample + layer;
     u32 px = task.film.x0 + pixel % task.film.width, py = task.film.y0 + pixel / task.film.width;
     FilmWriter writer = film_of_slot(task, slot);
-    film_count_samples(writer, pixel, 1u, other_half_samples(task.scene, sample, 1u));
+    film_count_samples(writer, pixel, 1u);
     Sampler sampler =
-        make_sampler(make_pixel_sequences(px, py, task.scene.seed, task.scene.log2_samples, task.scene.halves), sample);
+        make_sampler(make_pixel_sampler(px, py, task.scene.seed, task.scene.log2_samples), sample);
     Vec2 lens_u = task.scene.has_lens ? sample_2d(sampler, 1) : Vec2{0.5f, 0.5f};
     PathState path;
     task.wave.rays[i] = begin_path(task.scene, task.film, px, py, sample, sampler, sample_2d(sampler, 0), lens_u, path);

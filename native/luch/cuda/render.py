@@ -10,6 +10,7 @@ from __future__ import annotations
 import struct
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ MEMORY_SHARE = 0.85
 # Part of the free memory that a scene may take; film and paths want some, too.
 SCENE_SHARE = 0.8
 TREE_BYTES = 200  # of a triangle whose tree the device builds: its corners, its node's share, the builder's work space
+NONE = 0xFFFFFFFF  # of luch/platform.h: not there
+MARK_CHANNELS = 4  # of luch/film/film.h
 RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
 COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed")  # WaveCounter
 TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
@@ -46,7 +49,7 @@ class Memory:
         self._fields, self._task = fields, bytearray(task)
         stride = self.field("film.layout.stride", "<I")
         aovs = self.field("film.layout.aov_count", "<I")
-        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != 0xFFFFFFFF)
+        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE)
         self.layer_pixels = min(pixels, paths)
         self.layers = max(1, paths // pixels)
         slots = self.slots = self.layer_pixels * self.layers
@@ -114,10 +117,28 @@ class Memory:
         index = COUNTERS.index(name)
         return int(self.counters[index : index + 1].get()[0])
 
+    def mark(self, sample: int) -> None:
+        """As film_mark of luch/film/film.h, of every pixel and layer; to be called before that sample."""
+        marks = self.field("film.layout.marks", "<I")
+        if marks == NONE or sample == 0 or sample & (sample - 1):
+            return
+        channel = marks + (0 if sample & 0x55555555 else MARK_CHANNELS)
+        self.rows[..., channel : channel + 3] = self.rows[..., :3]  # Combined comes first
+        self.rows[..., channel + 3] = self.counts
+
     @property
     def bytes(self) -> int:
         """All of it."""
         return int(self.rows.nbytes + self.counts.nbytes + sum(array.nbytes for array in self.arrays.values()))
+
+
+def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
+    """Samples [first, first + count) as (first, count) of at most so many, none across a power of two: marks lie there."""
+    end = first + count
+    while first < end:
+        count = min(most, end - first, (1 << first.bit_length()) - first)
+        yield first, count
+        first += count
 
 
 def bytes_per_path(stride: int, pixels: int) -> float:
@@ -267,8 +288,8 @@ class DeviceRenderer:
         enter_context()
         memory, began = self._memory, time.perf_counter()
         ranges = [
-            (pixel, min(memory.layer_pixels, memory.pixels - pixel), sample, min(memory.layers, first + count - sample))
-            for sample in range(first, first + count, memory.layers)
+            (pixel, min(memory.layer_pixels, memory.pixels - pixel), sample, samples)
+            for sample, samples in parted(first, count, memory.layers)
             for pixel in range(0, memory.pixels, memory.layer_pixels)
         ]
         self._waves_done, self._waves = 0, len(ranges)
@@ -276,11 +297,19 @@ class DeviceRenderer:
             if self._cancelled:
                 break
             with self._lock:
+                if wave[0] == 0:
+                    memory.mark(wave[2])
                 self._trace_wave(*wave)
             self._waves_done += 1
         cupy().cuda.get_current_stream().synchronize()
         self._trace_seconds += time.perf_counter() - began
         return not self._cancelled
+
+    def mark(self, sample: int) -> None:
+        """Parts this device's samples before that one of all devices from those after it, if it is a power of two."""
+        with self._lock, self._device:
+            enter_context()
+            self._memory.mark(sample)
 
     def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int) -> None:
         memory, rays = self._memory, pixels * samples
@@ -348,11 +377,11 @@ class DeviceRenderer:
         passes: dict[str, Any] = self._host.core.passes()
         return passes
 
-    def deviations(self) -> tuple[Any, Any]:
+    def deviations(self) -> tuple[Any, Any, float]:
         """As core.render.Renderer's."""
         self._download()
-        mean, deviation = self._host.core.deviations()
-        return mean, deviation
+        mean, deviation, share = self._host.core.deviations()
+        return mean, deviation, share
 
     def stats(self) -> dict[str, Any]:
         """Counts, bytes and seconds, under the names of the CPU's."""

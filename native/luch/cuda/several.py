@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy
-from luch.cuda.render import DeviceRenderer, HostScene
+from luch.cuda.render import DeviceRenderer, HostScene, parted
 from luch.cuda.trace import TreesTooDeep
 from luch.effects import effects_of
 
@@ -109,6 +109,11 @@ class SeveralDevices:
     def render(self, first: int, count: int) -> bool:
         """Traces samples [first, first + count) of every pixel. False when cancelled."""
         self._merged = False
+        return all([self._render_part(*part) for part in parted(first, count, count)])
+
+    def _render_part(self, first: int, count: int) -> bool:
+        for device in self._devices:
+            device.mark(first)
         parts = shares(count, self._rates)
         seconds = [0.0] * len(parts)
 
@@ -171,11 +176,11 @@ class SeveralDevices:
         passes: dict[str, Any] = self._host.core.passes()
         return passes
 
-    def deviations(self) -> tuple[Any, Any]:
+    def deviations(self) -> tuple[Any, Any, float]:
         """As core.render.Renderer's."""
         self._download()
-        mean, deviation = self._host.core.deviations()
-        return mean, deviation
+        mean, deviation, share = self._host.core.deviations()
+        return mean, deviation, share
 
     def stats(self) -> dict[str, Any]:
         """Counts, bytes and seconds, of all devices together."""

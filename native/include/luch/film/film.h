@@ -10,11 +10,15 @@ namespace luch {
 
 using FilmSum = double;
 
+// What Combined held when the samples reached a power of two is kept, of the last two powers: the samples before and
+// after such a mark are two parts whose difference tells the picture's error.
+inline constexpr u32 MARKS = 2, MARK_CHANNELS = 4;
+
 // Where each pass starts in a pixel's row, in channels; NONE: the render does not ask for it.
 struct FilmLayout {
     u32 stride;    // channels of a row
     u32 combined;  // r, g, b, transparency (1 - alpha)
-    u32 half;      // r, g, b and count of the samples that are told to belong to the other half
+    u32 marks;     // MARKS times r, g, b and count of the samples before a mark
     u32 depth, position, object_index, material_index;   // of the pixel's first sample
     u32 mist, normal, uv;                                // mist: sum of 1 - mist
     u32 emission, environment, ambient_occlusion;
@@ -75,11 +79,8 @@ LUCH_FN void film_add(FilmWriter& writer, u32 pixel, u32 channel, Color value) {
     to[2] += value.z;
 }
 
-// other_half: the sample belongs to the second of two independently scrambled halves, whose
-// difference estimates the error.
-LUCH_FN void film_add_combined(FilmWriter& writer, u32 pixel, bool other_half, Color value) {
+LUCH_FN void film_add_combined(FilmWriter& writer, u32 pixel, Color value) {
     film_add(writer, pixel, writer.film.layout.combined, value);
-    if (other_half) film_add(writer, pixel, writer.film.layout.half, value);
 }
 
 // 1 - alpha of a path: its throughput where it leaves through a transparent film or a holdout.
@@ -137,10 +138,32 @@ LUCH_FN void film_add_crypto(FilmWriter& writer, u32 pixel, u32 channel, float i
     slot[1] += weight;
 }
 
-// others: how many of the samples belong to the other half.
-LUCH_FN void film_count_samples(FilmWriter& writer, u32 pixel, u32 samples, u32 others) {
+LUCH_FN void film_count_samples(FilmWriter& writer, u32 pixel, u32 samples) {
     writer.film.sample_counts[pixel] += samples;
-    if (writer.film.layout.half != NONE) film_row(writer.film, pixel)[writer.film.layout.half + 3u] += others;
+}
+
+LUCH_FN bool is_mark(u32 sample) { return sample != 0u && (sample & (sample - 1u)) == 0u; }
+
+// First channel of a mark; neighbouring powers of two take turns.
+LUCH_FN u32 mark_channel(const FilmLayout& layout, u32 sample) {
+    return layout.marks + ((sample & 0x55555555u) ? 0u : MARK_CHANNELS);
+}
+
+// To be called before a pixel's sample of that number, where is_mark says so.
+LUCH_FN void film_mark(FilmWriter& writer, u32 pixel, u32 sample) {
+    const FilmLayout& layout = writer.film.layout;
+    if (layout.marks == NONE) return;
+    FilmSum* row = film_row(writer.film, pixel);
+    FilmSum* to = row + mark_channel(layout, sample);
+    for (u32 k = 0; k < 3u; ++k) to[k] = row[layout.combined + k];
+    to[3] = writer.film.sample_counts[pixel];
+}
+
+// How many of the samples [first, first + count) come before the next mark.
+LUCH_FN u32 samples_to_mark(u32 first, u32 count) {
+    u32 next = 1u;
+    while (next != 0u && next <= first) next <<= 1;
+    return next != 0u && next - first < count ? next - first : count;
 }
 
 // What the first sample alone says, not a sum.

@@ -46,7 +46,7 @@ LUCH_FN void add_emission(const RenderView& scene, FilmWriter& writer, const Pat
                           u32 own_pass, u32 lightgroup) {
     Color c = path.throughput * radiance;
     if (is_zero(c) || !admit(scene, writer, c, path.bounce > 1 ? 1 : 0)) return;
-    film_add_combined(writer, path.pixel, path.flags & PATH_OTHER_HALF, c);
+    film_add_combined(writer, path.pixel, c);
     const FilmLayout& layout = writer.film.layout;
     if (!wants_light_passes(layout) && !gathers_features(path)) return;
     if (lightgroup) film_add_lightgroup(writer, path.pixel, lightgroup - 1, c);
@@ -74,7 +74,7 @@ LUCH_FN void add_direct(const RenderView& scene, FilmWriter& writer, const PathS
         film_add(writer, path.pixel, writer.film.layout.ambient_occlusion, c);
         return;
     }
-    film_add_combined(writer, path.pixel, path.flags & PATH_OTHER_HALF, c);
+    film_add_combined(writer, path.pixel, c);
     if (!wants_light_passes(writer.film.layout)) return;
     if (shadow.lightgroup) film_add_lightgroup(writer, path.pixel, shadow.lightgroup - 1, c);
     add_to_light_passes(writer, path.pixel, c, shadow.pass_diffuse, shadow.pass_glossy, shadow.bounce == 0);

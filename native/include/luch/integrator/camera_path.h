@@ -16,13 +16,12 @@ LUCH_FN Ray begin_path(const RenderView& scene, const FilmView& film, u32 px, u3
                      scene.has_lens ? lens_u : Vec2{0.5f, 0.5f});
     path = PathState{};
     path.sampler = sampler;
-    path.sample = sample;
+    path.sample = sample - scene.first_sample;
     path.throughput = path.feature_throughput = make_vec3(1.0f);
     path.continuation = 1.0f;
     path.min_pdf = 1e30f;
     path.flags =
         u32(PATH_CAMERA) | PATH_NO_MIS | PATH_THROUGH_FILM | (wants_features(film.layout) ? u32(PATH_FEATURES) : 0u);
-    if (sample & u32(scene.halves)) path.flags |= PATH_OTHER_HALF;
     path.visibility = RAY_CAMERA;
     path.dimension = DIMENSIONS_CAMERA;
     path.pixel = film_pixel(film, px, py);
@@ -30,11 +29,6 @@ LUCH_FN Ray begin_path(const RenderView& scene, const FilmView& film, u32 px, u3
     path.footprint = camera.footprint;
     path.spread = camera.spread;
     return camera.ray;
-}
-
-// How many of the samples [first, first + count) belong to the other half.
-LUCH_FN u32 other_half_samples(const RenderView& scene, u32 first, u32 count) {
-    return scene.halves ? (first + count) / 2u - first / 2u : 0u;
 }
 
 }  // namespace luch

@@ -21,7 +21,6 @@ enum PathMemory : u32 {
     PATH_DATA_DONE = 1u << 22,               // depth, normal and indices are written
     PATH_FEATURES = 1u << 23,                // denoising features are still to be written
     PATH_MIS_TRANSMITS = 1u << 24,           // the surface left last could be lit from behind
-    PATH_OTHER_HALF = 1u << 25,              // its sample belongs to the half that the film keeps apart
 };
 
 struct PathState {
@@ -37,7 +36,7 @@ struct PathState {
     u32 visibility;           // RayKind of the ray
     Sampler sampler;
     u32 dimension;
-    u32 sample;               // of its pixel
+    u32 sample;               // of its pixel in this render, 0 the first
     u32 pixel;
     u16 bounce, transparent_bounce;
     u8 diffuse_bounce, glossy_bounce, transmission_bounce;

@@ -22,8 +22,8 @@ struct RenderView {
     const ConstantEmission* material_emission;  // per material
     PathLimits limits;
     u32 seed;
+    u32 first_sample;         // of this render: others may take those before
     u32 log2_samples;         // the sampler leaves this much room for each pixel
-    bool halves;              // two independent sequences a pixel, kept apart in the film
     bool has_lens;            // paths choose a point of the aperture
     bool has_lights;          // anything that sample_light could choose
     bool has_visible_lamps;   // lamps of finite size that rays may meet

@@ -141,27 +141,4 @@ LUCH_FN PixelSampler make_pixel_sampler(u32 x, u32 y, u32 seed, u32 log2_samples
 
 LUCH_FN Sampler make_sampler(const PixelSampler& pixel, u32 sample) { return {pixel.seed, pixel.first_index + sample}; }
 
-// A pixel's samples, of one sequence or of two that are scrambled apart: even and odd samples then are
-// independent estimates, and their difference tells the error of their mean. Each half takes its own
-// sequence in order, so that at a power of two of samples both have drawn whole nets.
-struct PixelSequences {
-    PixelSampler half[2];
-    u32 halved;  // 1: two sequences, 0: one
-};
-
-// The other half's scrambles come from another seed; any constant that no caller adds by itself will do.
-inline constexpr u32 OTHER_HALF_SEED = 0x68616c66u;
-
-LUCH_FN PixelSequences make_pixel_sequences(u32 x, u32 y, u32 seed, u32 log2_samples, bool halved) {
-    if (!halved) return {{make_pixel_sampler(x, y, seed, log2_samples), {}}, 0u};
-    u32 log2_half = log2_samples > 0u ? log2_samples - 1u : 0u;
-    return {{make_pixel_sampler(x, y, seed, log2_half),
-             make_pixel_sampler(x, y, hash_u32(seed, OTHER_HALF_SEED), log2_half)},
-            1u};
-}
-
-LUCH_FN Sampler make_sampler(const PixelSequences& pixel, u32 sample) {
-    return make_sampler(pixel.half[sample & pixel.halved], sample >> pixel.halved);
-}
-
 }  // namespace luch
