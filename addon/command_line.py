@@ -11,6 +11,8 @@ import functools
 import sys
 from typing import Any, NoReturn
 
+from luch.stopping import UNLIMITED_SAMPLES
+
 
 class CommandLineError(ValueError):
     """A `--luch-...` option that does not exist or has no such value."""
@@ -21,7 +23,15 @@ class _Parser(argparse.ArgumentParser):
         raise CommandLineError(f"Command line: {message}. Luch knows {', '.join(OPTIONS)}.")
 
 
-OPTIONS = ("--luch-device CPU|CUDA", "--luch-gpus N", "--luch-without-effect NAME", "--luch-force-effect NAME|ALL")
+OPTIONS = (
+    "--luch-device CPU|CUDA",
+    "--luch-error 0.01",
+    "--luch-time SECONDS",
+    "--luch-samples N",
+    "--luch-gpus N",
+    "--luch-without-effect NAME",
+    "--luch-force-effect NAME|ALL",
+)
 
 
 @functools.cache
@@ -35,11 +45,24 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     parser.add_argument("--luch-gpus", type=int)
     parser.add_argument("--luch-without-effect", action="append", dest="luch_without_effects")
     parser.add_argument("--luch-force-effect", action="append", dest="luch_force_effects")
+    parser.add_argument("--luch-error", type=_positive_number, dest="luch_error_limit")
+    parser.add_argument("--luch-time", type=_positive_number, dest="luch_time_limit")
+    parser.add_argument("--luch-samples", type=int)
     found, rest = parser.parse_known_args(own)
     unknown = [word for word in rest if word.startswith("--luch")]
     if unknown:
         raise CommandLineError(f"Command line: {unknown[0]} is unknown. Luch knows {', '.join(OPTIONS)}.")
-    return {name.removeprefix("luch_"): value for name, value in vars(found).items() if value is not None}
+    told = {name.removeprefix("luch_"): value for name, value in vars(found).items() if value is not None}
+    if "error_limit" in told:
+        told.setdefault("samples", UNLIMITED_SAMPLES)
+    return told
+
+
+def _positive_number(text: str) -> float:
+    value = float(text)
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
 
 
 def current() -> dict[str, Any]:

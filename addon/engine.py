@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import bpy
+from luch import record
 from luch.scene import Scene
 
 from . import passes
@@ -16,6 +19,9 @@ from .result import ResultWriter
 
 # Statistics of the last render of each scene, by its name: what panels, scripts and tests read.
 last_stats: dict[str, dict[str, Any]] = {}
+
+# The same of renders under way, as far as the panel Accuracy shows them.
+live_stats: dict[str, dict[str, Any]] = {}
 
 PREVIEW_SAMPLES = 32  # of material and light icons
 
@@ -61,11 +67,13 @@ class LuchRenderEngine(bpy.types.RenderEngine):
             _receiver(scene)
             return
         with ResultWriter(self, depsgraph.view_layer.name, scene.film) as writer:
-            result = render.render(scene, progress=lambda progress: reporter.progress(progress, writer))
+            result = render.render(scene, progress=lambda progress: _goes_on(progress, reporter, writer))
             writer.write(result.passes)
         reporter.show(result.stats["warnings"][len(scene.warnings) :])
         stats = reporter.statistics(scene, result.stats)
         last_stats[depsgraph.scene.name] = stats
+        live_stats.pop(depsgraph.scene.name, None)
+        reporter.say_how_it_went(stats)
         writer.stamp(stats, scene)
 
     def _mesh_cache(self, depsgraph: Any) -> MeshCache:
@@ -75,6 +83,18 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         if not hasattr(self, "_caches"):
             self._caches: dict[str, MeshCache] = {}
         return self._caches.setdefault(depsgraph.view_layer.name, MeshCache())
+
+
+def _goes_on(progress: Any, reporter: Reporter, writer: ResultWriter) -> bool:
+    """Tells the user; False: the render is to end."""
+    if progress.curve is not None and progress.curve.points and progress.new_picture:
+        live_stats[reporter.scene_name] = {
+            **progress.curve.statistics(),
+            "samples": progress.samples,
+            "render_seconds": progress.seconds,
+            "error_asked": progress.asked_error,
+        }
+    return reporter.progress(progress, writer)
 
 
 def capture_scene(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Scene:
@@ -101,9 +121,23 @@ def capture_scene(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Sc
     return captured[0]
 
 
+def write_record(scene: bpy.types.Scene, *_: Any) -> None:
+    """Beside every frame that a headless render has written: NAME.json, with all that is known. For farms."""
+    stats = last_stats.get(scene.name)
+    if not bpy.app.background or stats is None or scene.render.engine != LuchRenderEngine.bl_idname:
+        return
+    path = Path(bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current))).with_suffix(".json")
+    try:
+        record.write_json(path, stats)
+    except OSError as error:
+        print(f"Luch: {path}: cannot be written ({error}). The frame is there.", file=sys.stderr)
+
+
 def register() -> None:
     bpy.utils.register_class(LuchRenderEngine)
+    bpy.app.handlers.render_write.append(bpy.app.handlers.persistent(write_record))  # other files' renders, too
 
 
 def unregister() -> None:
+    bpy.app.handlers.render_write.remove(write_record)
     bpy.utils.unregister_class(LuchRenderEngine)

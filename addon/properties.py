@@ -74,7 +74,7 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
     estimate_error: BoolProperty(
         name="Estimate Error",
         default=True,
-        description="Keep two halves of the samples apart, so that the render knows its error with an interval",
+        description="The render knows its error with an interval: 64 bytes a pixel, and no other picture",
     )
     without_effects: StringProperty(
         name="Effects Left Out", default="", description="Names from the list of effects, with semicolons between them"
@@ -92,6 +92,17 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         min=0.0,
         unit="TIME_ABSOLUTE",
         description="Stop after this many seconds; 0 for no limit",
+    )
+    error_limit_percent: FloatProperty(
+        name="Error Limit",
+        default=0.0,
+        min=0.0,
+        soft_max=20.0,
+        max=100.0,
+        precision=2,
+        subtype="PERCENTAGE",
+        description="Stop when the picture's error is that small (relative, root mean square over all pixels); 0 for no limit. "
+        "Max Samples still holds",
     )
     seed: IntProperty(name="Seed", default=0, min=0, description="Chooses the noise; the picture stays the same")
     use_animated_seed: BoolProperty(

@@ -7,7 +7,9 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import bpy
+from luch import record
 from luch.accuracy import percent
+from luch.curve import next_target
 from luch.scene import Scene
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ class Reporter:
 
     def __init__(self, engine: Any, scene: Any) -> None:
         self._engine = engine
-        self._scene_name = scene.name
+        self.scene_name = scene.name
         self._interval_s = FIRST_PICTURE_S
         self._next_picture = time.monotonic() + FIRST_PICTURE_S
         self._peak_memory_mib = 0.0
@@ -73,6 +75,11 @@ class Reporter:
             "cancelled": self.cancelled,
         }
 
+    def say_how_it_went(self, stats: dict[str, Any]) -> None:
+        """One line for those who read the console of a headless render."""
+        if not is_watched():
+            print(f"Luch: {stats['scene']}, frame {stats['frame']}: {record.line(stats)}", flush=True)
+
     def _show_picture(self, progress: Any, writer: ResultWriter) -> None:
         """The film so far, ever less often: converting it costs, and late changes are small."""
         now = time.monotonic()
@@ -95,10 +102,20 @@ def progress_line(progress: Any) -> str:
     parts = [f"Sample {progress.samples}/{progress.total_samples}"]
     if progress.error is not None:
         parts.append(f"Error {percent(progress.error)} %")
+        parts += forecast_of(progress)
     if math.isfinite(progress.remaining_seconds):
         parts.append(f"Remaining {clock(progress.remaining_seconds)}")
     parts.append(f"{progress.memory_bytes / MIB:.0f} MiB")
     return " | ".join(parts)
+
+
+def forecast_of(progress: Any) -> list[str]:
+    """ "1 % in 41 s (34 to 52)": the error asked for, else the next round one. Nothing where it is reached."""
+    ahead, found = progress.forecast, progress.error
+    aim = progress.asked_error or (next_target(found) if found > 0.0 else 0.0)
+    if ahead is None or not ahead.seconds > 0.0 or not math.isfinite(ahead.seconds):
+        return []
+    return [f"{aim * 100:g} % in {ahead.seconds:.2g} s ({ahead.seconds_low:.2g} to {ahead.seconds_high:.2g})"]
 
 
 def clock(seconds: float) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from . import datablocks, effects, operators, panels, stock
+from . import accuracy, datablocks, effects, operators, panels, stock
 
 
 def register() -> None:
     operators.register()
     stock.register()
     panels.register()
+    accuracy.register()
     effects.register()
     datablocks.register()
 
@@ -16,6 +17,7 @@ def register() -> None:
 def unregister() -> None:
     datablocks.unregister()
     effects.unregister()
+    accuracy.unregister()
     panels.unregister()
     stock.unregister()
     operators.unregister()

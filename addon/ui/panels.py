@@ -42,7 +42,14 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
 
     def draw(self, context: Any) -> None:
         draw_settings(
-            self.layout, context.scene, "samples", "time_limit", "seed", "use_animated_seed", "estimate_error"
+            self.layout,
+            context.scene,
+            "samples",
+            "time_limit",
+            "error_limit_percent",
+            "seed",
+            "use_animated_seed",
+            "estimate_error",
         )
         row = self.layout.row(align=True)
         row.prop(context.scene.luch, "follow_cycles")

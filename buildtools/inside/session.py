@@ -48,6 +48,15 @@ def choose_samples(
         settings.seed = seed
 
 
+def choose_error(scene: bpy.types.Scene, error: float, samples: int | None) -> None:
+    """Ends a render by Luch at that error, a fraction; without a number of samples, however many it takes."""
+    from luch.stopping import UNLIMITED_SAMPLES
+
+    settings = scene.luch
+    settings.error_limit_percent = 100.0 * error
+    settings.samples = samples or UNLIMITED_SAMPLES
+
+
 def choose_size(scene: bpy.types.Scene, width: int, height: int) -> None:
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import signal
 import sys
 import time
@@ -15,15 +14,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from luch import __version__, cryptomatte
+from luch.accuracy import percent
 from luch.bench import device_rays
 from luch.cuda import DeviceError
-from luch.effects import effects_of, summary
+from luch.effects import effects_of
 from luch.scene import Scene
 from luch.scenefile import read_scene
 from luch.stopping import UNLIMITED_SAMPLES
 
 if TYPE_CHECKING:
-    from luch.render import Progress, Result
+    from luch.render import Progress
 
 CANCELLED = 130  # exit status after Ctrl+C, as shells have it
 
@@ -74,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     render.add_argument("--gpus", type=_positive(int), help="how many GPUs share the samples (default: all)")
     render.add_argument("--threads", type=int, help="0: one per processor")
+    render.add_argument("--json", type=Path, metavar="PATH", help="write everything known about the render")
     render.add_argument("--quiet", action="store_true", help="no progress on stderr")
     render.set_defaults(run=_render)
 
@@ -100,7 +101,7 @@ def _positive(kind: Callable[[str], Any]) -> Callable[[str], Any]:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from luch import image
+    from luch import image, record
     from luch.render import render
 
     suffix = options.output.suffix.lower()
@@ -123,19 +124,18 @@ def _render(options: argparse.Namespace) -> int:
     for warning in result.stats.get("warnings", [])[len(scene.warnings) :]:
         print(f"luch: {warning}", file=sys.stderr)
     if suffix == ".png":
-        image.write_png(options.output, result.passes["Combined"], metadata=_statistics(result))
+        image.write_png(options.output, result.passes["Combined"], metadata=record.header_fields(result.stats))
     else:
-        metadata = {**_statistics(result), "luch.scene": scene.name, **cryptomatte.metadata(scene, "ViewLayer")}
+        metadata = {
+            **record.header_fields(result.stats),
+            "luch.scene": scene.name,
+            **cryptomatte.metadata(scene, "ViewLayer"),
+        }
         image.write_exr(options.output, result.passes, metadata=metadata)
-    seconds = result.stats.get("render_seconds", 0.0)
-    print(f"{options.output}: {result.stats.get('samples', 0)} samples in {seconds:.2f} s{_told_error(result)}")
+    if options.json is not None:
+        record.write_json(options.json, result.stats)
+    print(f"{options.output}: {record.line(result.stats)}")
     return CANCELLED if result.cancelled else 0
-
-
-def _told_error(result: Result) -> str:
-    from luch.curve import describe
-
-    return f", {describe(result.stats)}" if "error" in result.stats else ""
 
 
 def _override(scene: Scene, options: argparse.Namespace) -> None:
@@ -162,21 +162,6 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
         settings.without_effects = options.without_effect
     if options.force_effect:
         settings.force_effects = options.force_effect
-
-
-def _statistics(result: Result) -> dict[str, str | int | float]:
-    """Statistics as header fields: plain values as they are, others as JSON."""
-    fields: dict[str, str | int | float] = {}
-    for key, value in result.stats.items():
-        if key == "effects":
-            value = summary(value)
-        plain = isinstance(value, str | int | float) and not isinstance(value, bool)
-        # A header's integers have 32 bits.
-        if plain and not (isinstance(value, int) and abs(value) >= 2**31):
-            fields[f"luch.{key}"] = value
-        else:
-            fields[f"luch.{key}"] = json.dumps(value, default=str)
-    return fields
 
 
 class _Interrupt:
@@ -220,8 +205,9 @@ class _Line:
         if progress.preparing:
             self._write("building structures and lights")
             return
+        error = f", error {percent(progress.error)} %" if progress.error is not None else ""
         left = f", {progress.remaining_seconds:.0f} s left" if np.isfinite(progress.remaining_seconds) else ""
-        self._write(f"{progress.fraction:6.1%}  {progress.samples} of {progress.total_samples} samples{left}")
+        self._write(f"{progress.fraction:6.1%}  {progress.samples} of {progress.total_samples} samples{error}{left}")
 
     @staticmethod
     def _write(text: str) -> None:

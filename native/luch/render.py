@@ -32,6 +32,7 @@ STEP_SECONDS = 4.0
 # to a half apart. A look takes about so many seconds a pixel on one processor of 2024, until one was measured.
 LOOK_SHARE = 0.007
 LOOK_SECONDS = 1.2e-6
+QUICK_LOOK_SECONDS = 0.02  # taken however short the render, where an error is asked for
 # What reading passes takes at the end of a render that may only take so long; seconds a pixel and channel.
 PASS_SECONDS = 4e-9
 # The standard error of Combined, (H, W, 3), in its unit.
@@ -177,7 +178,10 @@ class _Loop:
             points.pop()  # the film may hold more since: parts of a step that was cut off
         elif seen:
             return
-        due = self.done == self.stopping.next_look(self.done - 1) and self._look_cost <= LOOK_SHARE * self.seconds
+        allowed = LOOK_SHARE * self.seconds
+        if self.settings.error_limit > 0.0:
+            allowed = max(allowed, QUICK_LOOK_SECONDS)
+        due = self.done == self.stopping.next_look(self.done - 1) and self._look_cost <= allowed
         asked = self.done == self.stopping.settled
         if not self.settings.estimate_error or not (last or due or asked):
             return

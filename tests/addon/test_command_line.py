@@ -28,3 +28,11 @@ def test_effects_are_left_out_and_forced_by_name() -> None:
         "without_effects": ["coat", "depth of field"],
         "force_effects": ["ALL"],
     }
+
+
+def test_an_error_is_asked_for_with_as_many_samples_as_it_takes() -> None:
+    words = ("blender", "--", "--luch-error", "0.01", "--luch-time", "600")
+    assert overrides(words) == {"error_limit": 0.01, "time_limit": 600.0, "samples": 65536}
+    assert overrides((*words, "--luch-samples", "128"))["samples"] == 128
+    with pytest.raises(CommandLineError, match="--luch-error"):
+        overrides(("blender", "--", "--luch-error", "-1"))

@@ -163,13 +163,32 @@ def test_statistics_are_kept_and_written_into_the_file(room: bpy.types.Scene) ->
     assert stats["effects"]["sun lamps"]["reason"] == '"Sun"'
     assert header["luch.ViewLayer.effects"].startswith("sun lamps, ")
     assert len(header["luch.ViewLayer.effects"]) < 500, "names alone: reasons are for the statistics"
-    assert "error" not in stats, "one sample has no second half"
+    assert "error" not in stats, "one sample has no second part"
     room.luch.samples = 2
     picture(room)
     stats = engine.last_stats[room.name]
     header = metadata(Path(room.render.filepath))
     for key in ("error", "error_low", "error_high", "fireflies_share"):
         assert float(header[f"luch.ViewLayer.{key}"]) == pytest.approx(stats[key])
+
+
+def test_a_headless_render_says_why_it_ended_and_leaves_all_it_knows_beside_its_frame(
+    room: bpy.types.Scene, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", ["blender", "--", "--luch-error", "0.5", "--luch-time", "60"])
+    picture(room)
+    stats = json.loads(Path(room.render.filepath).with_suffix(".json").read_text())
+    assert stats["stopped_by"] == "error" and stats["error"] <= 0.5 and stats["samples"] < 200
+    assert (stats["error_asked"], stats["time_asked"], stats["samples_asked"]) == (0.5, 60.0, 65536)
+    assert stats["error_low"] <= stats["error"] <= stats["error_high"] and len(stats["error_curve"]) >= 1
+    line = next(text for text in capfd.readouterr().out.splitlines() if text.startswith("Luch: "))
+    assert f"{stats['samples']} samples in " in line and line.endswith("error reached")
+    header = metadata(Path(room.render.filepath))
+    assert header["luch.ViewLayer.stopped_by"] == "error"
+    monkeypatch.setattr("sys.argv", ["blender", "--", "--luch-error", "0.000001", "--luch-time", "0.3"])
+    picture(room)
+    stats = json.loads(Path(room.render.filepath).with_suffix(".json").read_text())
+    assert stats["stopped_by"] == "time" and stats["total_seconds"] < 2.0
 
 
 def test_cryptomatte_carries_its_manifest(room: bpy.types.Scene) -> None:
@@ -216,7 +235,9 @@ def test_an_animation_renders_its_frames(room: bpy.types.Scene, tmp_path: Path) 
     room.render.filepath = str(tmp_path / "walk_")
     room.render.use_file_extension = True
     bpy.ops.render.render(animation=True)
-    assert sorted(path.name for path in tmp_path.glob("walk_*")) == ["walk_0003.exr", "walk_0004.exr"]
+    assert sorted(path.name for path in tmp_path.glob("walk_*.exr")) == ["walk_0003.exr", "walk_0004.exr"]
+    records = {path.name: json.loads(path.read_text()) for path in tmp_path.glob("walk_*.json")}
+    assert {name: stats["frame"] for name, stats in records.items()} == {"walk_0003.json": 3, "walk_0004.json": 4}
 
 
 def test_persistent_data_reads_only_what_changed(

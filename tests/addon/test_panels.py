@@ -6,10 +6,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
 
 from addon import engine
-from addon.ui import datablocks, effects, panels, stock
+from addon.ui import accuracy, datablocks, effects, panels, plot, stock
 
 
 class Layout:
@@ -35,6 +36,10 @@ class Layout:
         return self
 
     column = row
+
+    def template_icon(self, icon_value: int, scale: float) -> None:
+        assert icon_value >= 0 and scale > 1.0  # 0: no window, no icons
+        self.drawn.append("icon")
 
     def template_node_view(self, tree: Any, node: Any, socket: Any) -> None:
         assert socket is not None
@@ -114,6 +119,34 @@ def test_effects_of_the_last_render_are_listed_with_their_reasons(
     assert "(a lobe)" in "".join(shown) and max(map(len, shown)) <= 400 / 8 + 4
     hidden = draw(effects.LUCH_RENDER_PT_effects_off, scene, **context)
     assert hidden == ["Surfaces", "sheen", "    every sheen weight is 0"]
+
+
+def test_the_error_is_shown_with_its_curve(scene: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "last_stats", {})
+    assert draw(accuracy.LUCH_RENDER_PT_accuracy, scene) == ["Known after a few samples"]
+    stats = {
+        "error": 0.018, "error_low": 0.017, "error_high": 0.019, "fireflies_share": 0.12, "brightness": 0.5,
+        "brightness_low": 0.499, "brightness_high": 0.501, "next_error": 0.01, "seconds_to_next_error": 41.0,
+        "seconds_to_next_error_low": 34.0, "seconds_to_next_error_high": 52.0, "samples": 64, "render_seconds": 12.0,
+        "stopped_by": "time", "error_curve": [[16, 3.0, 0.036, 0.03, 0.04], [64, 12.0, 0.018, 0.017, 0.019]],
+    }  # fmt: skip
+    monkeypatch.setattr(engine, "last_stats", {scene.name: stats})
+    shown = draw(accuracy.LUCH_RENDER_PT_accuracy, scene)
+    assert shown[0] == "Error 1.8 % (95 %: 1.7 to 1.9 %)" and shown[-1] == "icon"
+    assert "1 % takes 41 s more (80 %: 34 to 52 s)" in shown and "64 samples, 12.0 s: time limit reached" in shown
+
+
+def test_a_curve_is_drawn_where_its_points_are() -> None:
+    points = [(1.0, 0.08, 0.07, 0.09), (4.0, 0.04, 0.035, 0.045), (16.0, 0.02, 0.019, 0.021)]
+    picture = plot.draw_curve(points, 0.01, 64.0)
+    x, y = plot.axes(points, 0.01, 64.0)
+    assert picture.shape == (plot.HEIGHT, plot.WIDTH, 4)
+    for seconds, error, _, _ in points:
+        assert picture[y.at(error), x.at(seconds), :3] == pytest.approx(plot.DOT)
+    assert picture[y.at(0.01), x.at(64.0), :3] == pytest.approx(plot.AIM)
+    assert x.at(1.0) < x.at(4.0) < x.at(64.0) and y.at(0.02) < y.at(0.08), "less error lies lower"
+    for odd in ([], [(0.0, 0.0, 0.0, 0.0)], points[:1]):
+        assert np.isfinite(plot.draw_curve(odd)).all()
 
 
 def test_settings_follow_cycles_again_at_a_press(scene: bpy.types.Scene) -> None:
