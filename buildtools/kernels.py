@@ -20,7 +20,7 @@ AHEAD = NATIVE / "luch" / "kernels"
 DEFAULT = "WATERTIGHT"
 OLDEST = 75  # PTX for it runs on everything newer
 # Box distances are rounded once, on purpose (accel/wide_ray.h): in the compressed wide tree, which every scene's top is.
-FUSES_BOXES = re.compile("CWBVH|TRACE_.*|RENDER_STAGES")
+FUSES_BOXES = re.compile("CWBVH|TRACE_.*|RENDER_STAGES|RENDER_WALKS")
 # Where a walk is in doubt, its cells are found in double (accel/grid.h).
 WALKS_IN_DOUBLE = re.compile("(TRACE_)?(HIERARCHICAL_)?GRID")
 # The driver would compile them for minutes; luch.cuda.compiler has them compiled for the scene instead.

@@ -11,6 +11,7 @@
 #include "bindings/forced.h"
 #include "bindings/scene_reader.h"
 #include "bindings/scene_trees.h"
+#include "luch/integrator/subsurface.h"
 
 namespace luch::bindings {
 namespace {
@@ -83,6 +84,7 @@ class PyRenderer {
         facts["programs"] = programs;
         facts["registers"] = registers;
         facts["transparent"] = transparent;
+        facts["subsurface"] = scene.has_subsurface;
         facts["materials"] = scene.view.material_count;
         facts["structure"] = cpu::accel_name({false, renderer_->trees().kind()});
         facts["one_group"] = renderer_->trees().is_one_group();
@@ -153,6 +155,7 @@ py::dict task_fields() {
     LUCH_FIELD(wave.shadows);
     LUCH_FIELD(wave.shadow_kind);
     LUCH_FIELD(wave.blocked);
+    LUCH_FIELD(wave.walks);
     LUCH_FIELD(wave.aovs);
     LUCH_FIELD(wave.counters);
     LUCH_FIELD(wave.totals);
@@ -170,6 +173,7 @@ py::dict task_sizes() {
     sizes["ray"] = sizeof(Ray);
     sizes["hit"] = sizeof(Hit);
     sizes["shadow"] = sizeof(ShadowRay);
+    sizes["walk"] = sizeof(SubsurfaceWalk);
     sizes["counters"] = u32(WAVE_COUNTERS);
     sizes["totals"] = u32(TOTALS);
     return sizes;

@@ -37,8 +37,8 @@ ATTRIBUTE_TANGENT = 0xFFFFFFF3
 _LIGHT_CLOSURES = ("CLOSURE_EMISSION", "CLOSURE_TRANSPARENT", "CLOSURE_HOLDOUT")
 _BACKFACING = "POINT_BACKFACING"
 PRINCIPLED = ("CLOSURE_PRINCIPLED", "CLOSURE_PRINCIPLED_SUBSURFACE")
-# Closures that scatter light under the surface -> the first of the three inputs that are their normal.
-SUBSURFACE_NORMAL = {"CLOSURE_SUBSURFACE": 12, "CLOSURE_PRINCIPLED_SUBSURFACE": 14}
+# Closures that scatter light under the surface -> where among their inputs the radius and the normal begin.
+_SUBSURFACE = {"CLOSURE_SUBSURFACE": (6, 12), "CLOSURE_PRINCIPLED_SUBSURFACE": (3, 14)}
 
 
 @dataclass(frozen=True)
@@ -159,10 +159,12 @@ def program_flags(order: Sequence[Node], constant_of: Mapping[int, float], table
             flags |= SURFACE
             if name in PRINCIPLED:  # params: bump correction, multiscatter, emits, lets through
                 flags |= (EMISSION if node.params[2] else 0) | (TRANSPARENT if node.params[3] else 0)
-            if name in SUBSURFACE_NORMAL:
-                first = SUBSURFACE_NORMAL[name]
-                bent = any(constant_of.get(value) != 0.0 for value in node.inputs[first : first + 3])
-                flags |= SUBSURFACE | (SUBSURFACE_BUMP if bent else 0)
+            if name in _SUBSURFACE:
+                walks, bent = (
+                    any(constant_of.get(value) != 0.0 for value in node.inputs[first : first + 3])
+                    for first in _SUBSURFACE[name]
+                )
+                flags |= (SUBSURFACE | (SUBSURFACE_BUMP if bent else 0)) if walks else 0
         elif name.startswith("LIGHT_PATH"):
             flags |= LIGHT_PATH
     if flags & EMISSION:

@@ -1,12 +1,17 @@
 #include "cpu/accel/local_trees.h"
 
+#include <stdexcept>
+
 #include "cpu/accel/traverse.h"
 
 namespace luch::cpu {
 
-LocalTrees::LocalTrees(const SceneView& scene, const std::vector<u8>& wanted, Precision precision, ThreadPool& pool) {
+LocalTrees::LocalTrees(const SceneView& scene, const std::vector<u8>& wanted, Precision precision, bool for_device,
+                       ThreadPool& pool) {
     AccelChoice choice;
     choice.precision = precision;
+    choice.wide = !for_device;
+    choice.kind = StructureKind::CWBVH;
     std::vector<u32> group_of(scene.mesh_count, NONE);
     entries_.assign(scene.instance_count, {{}, NONE});
     for (u32 i = 0; i < scene.instance_count; ++i) {
@@ -22,17 +27,45 @@ LocalTrees::LocalTrees(const SceneView& scene, const std::vector<u8>& wanted, Pr
         build_group(group, scene, {}, choice, pool);
         bytes_ += group.nodes.bytes() + group.blocks.bytes();
     }
-    for (Entry& entry : entries_)
-        if (entry.group != NONE && groups_[entry.group].kept == 0) entry.group = NONE;
-    bytes_ += entries_.size() * sizeof(Entry);
+    for (LocalTreeEntry& entry : entries_)
+        if (entry.tree != NONE && groups_[entry.tree].kept == 0) entry.tree = NONE;
+    bytes_ += entries_.size() * sizeof(LocalTreeEntry);
+    if (for_device) keep_views();
+}
+
+void LocalTrees::keep_views() {
+    for (Group& group : groups_) {
+        trees_.emplace_back();
+        if (group.kept == 0) continue;
+        size_t bytes = 0;
+        trees_.back() = *static_cast<const Cwbvh*>(group.structure->view(&bytes));
+        StructureStats stats = group.structure->stats();
+        bytes_ += stats.bytes;
+        if (stats.depth >= CWBVH_MAX_DEPTH) throw std::length_error("A mesh's wide tree is too deep.");
+        group.corners = {};  // the tree's leaves hold them
+    }
+    view_ = {entries_.data(), trees_.data()};
+}
+
+void LocalTrees::describe(DeviceImage& image, u32 block, const LocalTreesView* const& pointer) const {
+    u32 view = image.add_array("local trees", block, pointer, 1);
+    image.add_array("local entries", view, pointer->entries, entries_.size());
+    u32 trees = image.add_array("local roots", view, pointer->trees, trees_.size());
+    for (size_t g = 0; g < groups_.size(); ++g) {
+        if (groups_[g].kept == 0) continue;
+        for (const StructureArray& array : groups_[g].structure->arrays()) {
+            u32 target = image.add(array.name, array.data, array.bytes);
+            image.links.push_back({trees, g * sizeof(Cwbvh) + array.view_offset, target, 0});
+        }
+    }
 }
 
 Hit LocalTrees::closest(u32 instance, const Ray& ray) const {
     Hit miss = no_scene_hit();
-    const Entry& entry = entries_[instance];
+    const LocalTreeEntry& entry = entries_[instance];
     Ray inside;
-    if (entry.group == NONE || !ray_is_valid(ray) || !enter_instance(entry.to_object, ray, &inside)) return miss;
-    const Group& group = groups_[entry.group];
+    if (entry.tree == NONE || !ray_is_valid(ray) || !enter_instance(entry.to_object, ray, &inside)) return miss;
+    const Group& group = groups_[entry.tree];
     RefHit hit = {min_f(ray.t_max, LARGEST_DISTANCE), NONE, 0.0f, 0.0f};
     NoCounters none;
     closest_in_group(group, lane_ray(inside), max_f(ray.t_min, 0.0f), &hit, none);

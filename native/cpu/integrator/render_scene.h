@@ -11,7 +11,7 @@ class LocalTrees;
 
 struct RenderScene : RenderView {
     const Accel* accel = nullptr;
-    const LocalTrees* local_trees = nullptr;  // null: nothing scatters under its surface
+    const LocalTrees* walk_trees = nullptr;  // null: nothing scatters under its surface
     PixelFilter filter_table;
     std::vector<ConstantEmission> emission_of_materials;
     size_t max_registers = 0;  // of any program

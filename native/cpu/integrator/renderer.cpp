@@ -54,10 +54,9 @@ void Renderer::build_all() {
     double start = seconds_now();
     if (input_.for_device)
         build_device_trees();
-    else {
+    else
         build_accel();
-        build_local_trees();
-    }
+    build_local_trees();
     stats_.accel_seconds = seconds_now() - start;
     stats_.scene_bytes = store_->bytes();
     scene_.camera = input_.camera;
@@ -117,8 +116,10 @@ void Renderer::build_local_trees() {
     std::vector<u8> wanted = instances_with_subsurface(scene_.view);
     scene_.has_subsurface = !wanted.empty();
     if (wanted.empty()) return;
-    local_trees_ = std::make_unique<LocalTrees>(scene_.view, wanted, input_.accel.choice.precision, pool_);
-    scene_.local_trees = local_trees_.get();
+    local_trees_ =
+        std::make_unique<LocalTrees>(scene_.view, wanted, input_.accel.choice.precision, input_.for_device, pool_);
+    scene_.walk_trees = local_trees_.get();
+    scene_.local_trees = input_.for_device ? local_trees_->view() : nullptr;
     stats_.local_tree_bytes = local_trees_->bytes();
 }
 
@@ -142,6 +143,7 @@ DeviceImage Renderer::device_image() {
     image.link(block, &task_.scene.view.lights, lights_.describe(image));
     image.add_array("camera", block, task_.scene.view.camera, 1);
     image.add_array("filter", block, task_.scene.filter, 1);
+    if (task_.scene.local_trees) local_trees_->describe(image, block, task_.scene.local_trees);
     image.add_array("material_emission", block, task_.scene.material_emission, scene_.emission_of_materials.size());
     return image;
 }

@@ -24,7 +24,7 @@ bool Batch::enters_subsurface(u32 k, int lane, const ClosureSet& set, const Surf
 
 // All walks of this generation; then, material by material, what comes out is lit and goes on.
 void Batch::walk_subsurface() {
-    LocalTracer tracer{*scene_.local_trees};
+    LocalTracer tracer{*scene_.walk_trees};
     counts_.subsurface_walks += u64(walk_count_);
     int exits = 0;
     for (int i = 0; i < walk_count_; i++) {

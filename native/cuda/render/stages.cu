@@ -5,6 +5,7 @@
 #ifndef LUCH_STRUCTURE
 #define LUCH_STRUCTURE Cwbvh
 #endif
+#include "render/exits.cuh"
 #include "render/light.cuh"
 #include "render/shadow.cuh"
 #include "render/surface.cuh"

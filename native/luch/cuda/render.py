@@ -36,20 +36,21 @@ TREE_BYTES = 200  # of a triangle whose tree the device builds: its corners, its
 NONE = 0xFFFFFFFF  # of luch/platform.h: not there
 MARK_CHANNELS = 4  # of luch/film/film.h
 RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
-COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed")  # WaveCounter
+COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed", "walks", "walked")  # WaveCounter
 TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
-          "light_points")  # WaveTotal  # fmt: skip
+          "light_points", "subsurface_walks", "subsurface_steps")  # WaveTotal  # fmt: skip
 
 
 class Memory:
     """The film and the wavefront on the device, and their places in the RenderTask."""
 
-    def __init__(self, task: bytes, pixels: int, materials: int, paths: int) -> None:
+    def __init__(self, task: bytes, pixels: int, materials: int, paths: int, walks: bool) -> None:
+        """walks: paths may go under surfaces."""
         cp, fields, sizes = cupy(), core.render.task_fields(), core.render.task_sizes()
         self._fields, self._task = fields, bytearray(task)
         stride = self.field("film.layout.stride", "<I")
         aovs = self.field("film.layout.aov_count", "<I")
-        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE)
+        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE) + walks
         self.layer_pixels = min(pixels, paths)
         self.layers = max(1, paths // pixels)
         slots = self.slots = self.layer_pixels * self.layers
@@ -79,6 +80,8 @@ class Memory:
             "counters": self.counters,
             "totals": self.totals,
         }
+        if walks:
+            self.arrays["walks"] = empty(slots * sizes["walk"])
         if aovs:
             self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
         self._set("film.rows", "<Q", self.rows.data.ptr)
@@ -141,11 +144,12 @@ def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
         first += count
 
 
-def bytes_per_path(stride: int, pixels: int) -> float:
+def bytes_per_path(stride: int, pixels: int, walks: bool = False) -> float:
     """Device memory of one path under way: its state, its queues, and its part of a layer of the film."""
     sizes = core.render.task_sizes()
     queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + 2 * (sizes["ray"] + sizes["shadow"] + 5)
-    return float(sizes["path"] + queues + 8 * stride + 4)
+    inside = walks * (sizes["walk"] + sizes["ray"] + sizes["shadow"] + 5)
+    return float(sizes["path"] + queues + inside + 8 * stride + 4)
 
 
 def _told_images(sizes: list[int]) -> list[str]:
@@ -232,6 +236,7 @@ class DeviceRenderer:
         self._upload_seconds = time.perf_counter() - began
         self._paths = load("RENDER_PATHS", self._scene.settings.precision)
         self._stages = SceneKernels(facts, blocks, self._scene)
+        self._walks = load("RENDER_WALKS", self._scene.settings.precision) if facts["subsurface"] else None
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
         self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]))
@@ -265,12 +270,13 @@ class DeviceRenderer:
         free, _ = cp.cuda.runtime.memGetInfo()
         fields, root = core.render.task_fields(), self._arrays.root
         stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
-        fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels))
+        walks = self._walks is not None
+        fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels, walks))
         samples = max(1, self._scene.settings.samples)
         paths = min(MOST_PATHS, fits, pixels * samples)
         while paths >= min(FEWEST_PATHS, pixels):
             try:
-                return Memory(root, pixels, materials, paths)
+                return Memory(root, pixels, materials, paths, walks)
             except cp.cuda.memory.OutOfMemoryError:
                 cp.get_default_memory_pool().free_all_blocks()
                 paths //= 2
@@ -336,6 +342,10 @@ class DeviceRenderer:
         self._launch(paths.kernel("place_materials"), turn, 1)
         self._launch(paths.kernel("sort_hits"), turn, rays)
         self._launch(stages.kernel("shade_surfaces"), turn, rays)
+        if self._walks is not None and (walks := memory.count("walks")):
+            kernel = self._walks.kernel("walk_subsurface")
+            kernel.launch(min(kernel.resident_blocks(BLOCK), -(-walks // BLOCK)), BLOCK, [memory.tasks[turn]])
+            self._launch(stages.kernel("shade_exits"), turn, walks)
         shadows = memory.count("shadows")
         if shadows:
             self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"), memory.address("blocked"),

@@ -16,11 +16,10 @@ from typing import Any
 from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy
 from luch.cuda.render import DeviceRenderer, HostScene, parted
 from luch.cuda.trace import TreesTooDeep
-from luch.effects import effects_of
 
 # Counts and seconds that are added up; of other statistics the first device's stand for all.
 SUMMED = ("paths", "rays", "shadow_rays", "surface_points", "non_finite_samples", "transparent_steps", "world_points",
-          "light_points", "device_scene_bytes", "device_film_and_paths_bytes", "paths_at_once")  # fmt: skip
+          "light_points", "device_scene_bytes", "device_film_and_paths_bytes", "paths_at_once", "subsurface_walks", "subsurface_steps")  # fmt: skip
 
 
 def renderer_for(scene: Any) -> Any:
@@ -29,8 +28,6 @@ def renderer_for(scene: Any) -> Any:
     Raises DeviceError where there is none, ValueError for data that does not fit together.
     """
     wanted = scene.settings.gpus
-    if effects_of(scene)["subsurface"].on:
-        raise DeviceError("light under surfaces (subsurface scattering) is not there on CUDA yet.")
     if wanted < 0:
         raise ValueError(f"Settings: gpus is {wanted}; it can be 0 (all) or how many to use.")
     chosen = usable_devices()[: wanted or None]

@@ -12,7 +12,7 @@ from typing import Any
 
 from luch.effects.editing import Change, Editor, rewrite
 from luch.scene import Scene
-from luch.shader_code import Node
+from luch.shader_code import PRINCIPLED, Node
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,18 @@ def _zeroed(inputs: Mapping[str, tuple[str, ...]], dropped: tuple[str, ...] = ()
     def change(editor: Editor, node: Node) -> Node | None:
         if node.op.name in dropped:
             return None
-        for name in inputs.get(node.op.name, ()):
+        kind = "CLOSURE_PRINCIPLED" if node.op.name in PRINCIPLED else node.op.name
+        for name in inputs.get(kind, ()):
             node = editor.with_input(node, name, 0.0)
         return node
 
     return change
+
+
+def _flattened(editor: Editor, node: Node) -> Node:
+    """Nothing goes under the surface: the radius is 0."""
+    names = {"CLOSURE_SUBSURFACE": "radius", "CLOSURE_PRINCIPLED_SUBSURFACE": "subsurface_radius"}
+    return editor.with_input(node, names[node.op.name], 0.0) if node.op.name in names else node
 
 
 def _straight(operation: str) -> Change:
@@ -162,6 +169,7 @@ REMOVALS: dict[str, Removal] = {
         ),
     ),
     "thin film": Removal("the surface below", _surfaces(_zeroed(dict.fromkeys(_FILMS, ("thin_film_thickness",))))),
+    "subsurface": Removal("a diffuse surface of its colour", _surfaces(_flattened)),
     "bump": Removal("the normal below", _surfaces(_straight("BUMP"))),
     "normal maps": Removal("the normal below", _surfaces(_straight("NORMAL_MAP"))),
     "holdout": Removal("the object itself", _no_holdout),

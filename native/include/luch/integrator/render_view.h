@@ -15,6 +15,8 @@ struct ConstantEmission {
     Color radiance;
 };
 
+struct LocalTreesView;  // accel/local_trees.h
+
 struct RenderView {
     SceneView view;
     CameraView camera;
@@ -29,6 +31,7 @@ struct RenderView {
     bool has_visible_lamps;   // lamps of finite size that rays may meet
     bool has_world;           // one that is not black
     bool has_subsurface;      // some surface scatters light under itself
+    const LocalTreesView* local_trees;  // on a device, of instances that do
     bool can_meet_light;      // a ray may come upon an emitter, a lamp or the world by itself
     u32 world_visibility, world_lightgroup;
     ConstantEmission world_emission;

@@ -22,9 +22,9 @@ inline constexpr u32 WALK_SEQUENCE_STEPS = 2;
 inline constexpr u32 WALK_FIRST_DIMENSION = 0x10000u;  // above those of every path
 
 // A path under the surface. The queue between the stage at a surface and that where it comes out.
-struct SubsurfaceWalk {
+struct alignas(16) SubsurfaceWalk {
     Vec3 entry;           // where it went in, just under the surface, world
-    u32 ray;              // of this generation (CPU: entry of rays, CUDA: too)
+    u32 ray;              // that brought it, of this generation
     Vec3 normal;          // interpolated, unit, where it went in, outwards
     u32 instance;         // that it is in
     Vec3 position;        // where the last step began
@@ -152,7 +152,8 @@ LUCH_FN void choose_direction(SubsurfaceWalk& walk, const Guide& guide, float g,
     if (walk.opposite >= 0.0f) {
         // Away from the entry the nearer the other side is; both guides share one diffusion length.
         float depth = clamp_f(dot(walk.entry - walk.position, walk.normal), 0.0f, walk.opposite);
-        step.backward_share = 1.0f / (1.0f + exp_f((walk.opposite - 2.0f * depth) / guide.length));
+        float paths = (walk.opposite - 2.0f * depth) * dot(step.chances, step.extinction);  // mean free paths
+        step.backward_share = 1.0f / (1.0f + exp_f(paths / guide.length));
         back = u.side < step.backward_share;
     }
     float cosine, phase;  // with the normal; of the phase function
@@ -256,16 +257,22 @@ LUCH_FN WalkPlan begin_walk(SubsurfaceWalk& walk) {
     return {medium, guide_of(max_component(medium.albedo))};
 }
 
-// tracer.closest(instance, ray): the nearest hit in that instance alone. *steps counts rays.
+// tracer.closest(instance, ray): the nearest hit in that instance alone.
+template <class Tracer>
+LUCH_FN WalkFate take_step(SubsurfaceWalk& walk, const WalkPlan& plan, Tracer& tracer) {
+    WalkStep step = begin_step(walk, plan.medium, plan.guide);
+    Ray ray = {walk.position, 0.0f, walk.direction, step.reach};
+    Hit hit = tracer.closest(walk.instance, ray);
+    return finish_step(walk, step, hit);
+}
+
+// *steps counts rays.
 template <class Tracer>
 LUCH_FN void walk_inside(SubsurfaceWalk& walk, Tracer& tracer, u64* steps) {
     WalkPlan plan = begin_walk(walk);
     WalkFate fate;
     do {
-        WalkStep step = begin_step(walk, plan.medium, plan.guide);
-        Ray ray = {walk.position, 0.0f, walk.direction, step.reach};
-        Hit hit = tracer.closest(walk.instance, ray);
-        fate = finish_step(walk, step, hit);
+        fate = take_step(walk, plan, tracer);
         ++*steps;
     } while (fate == WalkFate::GOES_ON);
     if (fate == WalkFate::LOST) walk.hit.instance = NONE;

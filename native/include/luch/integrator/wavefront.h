@@ -13,6 +13,8 @@ enum WaveCounter : u32 {
     WAVE_HITS,         // rays that met a surface
     WAVE_TRACED,       // work counter of the closest kernel
     WAVE_SHADOWED,     // and of the shadow kernel
+    WAVE_WALKS,        // under surfaces, of this round
+    WAVE_WALKED,       // work counter of their kernel
     WAVE_COUNTERS
 };
 
@@ -24,6 +26,8 @@ enum WaveTotal : u32 {
     TOTAL_TRANSPARENT_RAYS,
     TOTAL_WORLD_POINTS,
     TOTAL_LIGHT_POINTS,
+    TOTAL_WALKS,
+    TOTAL_WALK_STEPS,
     TOTALS
 };
 
@@ -32,6 +36,8 @@ struct alignas(16) PathWord {
     u32 w[4];
 };
 inline constexpr u32 PATH_WORDS = (sizeof(PathState) + sizeof(PathWord) - 1) / sizeof(PathWord);
+
+struct SubsurfaceWalk;  // integrator/subsurface.h
 
 // A slot holds one path. Slot = layer * layer_pixels + pixel within the wave: paths of one pixel that are under way
 // together write to different layers of the film, so that no sum depends on who came first.
@@ -53,6 +59,7 @@ struct Wavefront {
     ShadowRay* shadows;
     u32* shadow_kind;          // RAY_SHADOW, all of them
     u8* blocked;
+    SubsurfaceWalk* walks;     // that begin in this round; null: nothing scatters under its surface
     float* aovs;               // 4 floats for each of the film's AOVs, per entry of sorted; null: none
     u32* counters;             // WaveCounter
     u64* totals;               // WaveTotal
