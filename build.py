@@ -45,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--samples", type=int, help="samples per pixel (default: the file's; the demo: 64)")
     render.add_argument("--time", type=float, help="stop after this many seconds of rendering")
     render.add_argument("--error", type=float, help="stop when the picture's error is that small, e.g. 0.01")
+    render.add_argument("--verify", action="store_true", help="hold the claimed error against a second render's")
     render.add_argument("--seed", type=int, help="seed of the sampler")
     render.add_argument("--frame", type=int, help="frame to render (default: the file's current one)")
     render.add_argument("--scale", type=float, help="factor on the resolution, e.g. 0.5")

@@ -28,6 +28,7 @@ OPTIONS = (
     "--luch-error 0.01",
     "--luch-time SECONDS",
     "--luch-samples N",
+    "--luch-verify",
     "--luch-gpus N",
     "--luch-without-effect NAME",
     "--luch-force-effect NAME|ALL",
@@ -48,6 +49,7 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     parser.add_argument("--luch-error", type=_positive_number, dest="luch_error_limit")
     parser.add_argument("--luch-time", type=_positive_number, dest="luch_time_limit")
     parser.add_argument("--luch-samples", type=int)
+    parser.add_argument("--luch-verify", action="store_const", const=True)
     found, rest = parser.parse_known_args(own)
     unknown = [word for word in rest if word.startswith("--luch")]
     if unknown:

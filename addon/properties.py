@@ -104,6 +104,11 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         description="Stop when the picture's error is that small (relative, root mean square over all pixels); 0 for no limit. "
         "Max Samples still holds",
     )
+    verify: BoolProperty(
+        name="Verify the Error",
+        default=False,
+        description="Render in two halves with other noise, and hold the claimed error against their difference",
+    )
     seed: IntProperty(name="Seed", default=0, min=0, description="Chooses the noise; the picture stays the same")
     use_animated_seed: BoolProperty(
         name="Use Animated Seed", default=False, description="Another noise in every frame of an animation"

@@ -44,7 +44,9 @@ def render(arguments: Arguments) -> int:
         raise BuildFailure(f"--output {arguments.output}: only .exr (multilayer) and .png can be written")
     _prepare(arguments)
     return _inside_blender(
-        "render", arguments, ["file", "samples", "time", "error", "seed", "frame", "scale", "output", "engine"]
+        "render",
+        arguments,
+        ["file", "samples", "time", "error", "verify", "seed", "frame", "scale", "output", "engine"],
     )
 
 

@@ -44,6 +44,7 @@ def export_settings(context: ExportContext) -> Settings:
         gpus=scene.luch.gpus,
         texture_memory=scene.luch.texture_memory,
         estimate_error=scene.luch.estimate_error,
+        verify=scene.luch.verify,
         error_limit=scene.luch.error_limit_percent / 100.0,
         without_effects=names_of(scene.luch.without_effects),
         force_effects=["ALL"] if scene.luch.force_effects else [],

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import bpy.utils.previews
 from luch.accuracy import percent
-from luch.record import ENDS
+from luch.record import ENDS, verdict
 
 from .. import engine
 from .panels import LuchPanel
@@ -33,8 +33,8 @@ def rows(stats: dict[str, Any]) -> list[str]:
     lines.append(f"{stats['samples']} samples, {stats['render_seconds']:.1f} s")
     if stats.get("stopped_by") in ENDS:
         lines[-1] += f": {ENDS[stats['stopped_by']]}"
-    for taken in stats.get("taken", []):
-        lines.append(taken)
+    if "verified" in stats:
+        lines.append(verdict(stats["verified"]).capitalize())
     return lines
 
 

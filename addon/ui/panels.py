@@ -47,6 +47,7 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
             "samples",
             "time_limit",
             "error_limit_percent",
+            "verify",
             "seed",
             "use_animated_seed",
             "estimate_error",

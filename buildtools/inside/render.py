@@ -26,6 +26,7 @@ def main(options: dict[str, Any]) -> int:
     if options["scale"] is not None:
         scene.render.resolution_percentage = max(1, round(scene.render.resolution_percentage * options["scale"]))
     session.choose_samples(scene, options["samples"], options["time"], options["seed"])
+    scene.luch.verify = bool(options["verify"]) or scene.luch.verify
     if options["error"] is not None and options["engine"] == "LUCH":
         session.choose_error(scene, options["error"], options["samples"])
     render = session.render_frame(scene)

@@ -76,6 +76,14 @@ py::tuple film_deviations(const cpu::Film& film) {
     return py::make_tuple(mean, deviation, before);
 }
 
+py::tuple film_arrays(cpu::Film& film, const py::object& owner) {
+    FilmView view = film.view();
+    py::ssize_t pixels = py::ssize_t(view.width) * py::ssize_t(view.height), stride = py::ssize_t(view.layout.stride);
+    py::array_t<double> rows({pixels, stride}, {stride * 8, py::ssize_t{8}}, view.rows, owner);
+    py::array_t<u32> counts({pixels}, {py::ssize_t{4}}, view.sample_counts, owner);
+    return py::make_tuple(rows, counts);
+}
+
 void bind_film(py::module_& m) {
     auto film = m.def_submodule("film", "Sums of samples, and render passes read from them.");
     py::class_<cpu::Film>(film, "Film")
@@ -121,6 +129,10 @@ void bind_film(py::module_& m) {
                  FilmWriter writer{self.view(), 0};
                  film_mark(writer, pixel, sample);
              })
+        .def("marks", [](cpu::Film& self) { return self.view().layout.marks; })
+        .def(
+            "arrays", [](const py::object& self) { return film_arrays(self.cast<cpu::Film&>(), self); },
+            "The sums (pixels, channels) float64 and sample counts (pixels,) uint32, to be read and written.")
         .def("merge", &cpu::Film::merge)
         .def("resolve", &resolve_film)
         .def("deviations", &film_deviations);

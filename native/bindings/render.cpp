@@ -55,13 +55,7 @@ class PyRenderer {
     // The film's sums (pixels, channels) float64 and sample counts (pixels,) uint32, to be written by whoever renders
     // in this renderer's place.
     static py::tuple film_arrays(const py::object& self) {
-        cpu::Film& film = self.cast<PyRenderer&>().renderer_->film();
-        FilmView view = film.view();
-        py::ssize_t pixels = py::ssize_t(view.width) * py::ssize_t(view.height),
-                    stride = py::ssize_t(view.layout.stride);
-        py::array_t<double> rows({pixels, stride}, {stride * 8, py::ssize_t{8}}, view.rows, self);
-        py::array_t<u32> counts({pixels}, {py::ssize_t{4}}, view.sample_counts, self);
-        return py::make_tuple(rows, counts);
+        return bindings::film_arrays(self.cast<PyRenderer&>().renderer_->film(), self);
     }
 
     // What decides which code a device needs.

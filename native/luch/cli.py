@@ -74,9 +74,21 @@ def _parser() -> argparse.ArgumentParser:
     )
     render.add_argument("--gpus", type=_positive(int), help="how many GPUs share the samples (default: all)")
     render.add_argument("--threads", type=int, help="0: one per processor")
+    render.add_argument("--mergeable", action="store_true", help="keep the film's sums in the .exr, for `merge`")
+    render.add_argument(
+        "--verify",
+        action="store_true",
+        help="render two halves with other seeds and hold the claimed error against them",
+    )
     render.add_argument("--json", type=Path, metavar="PATH", help="write everything known about the render")
     render.add_argument("--quiet", action="store_true", help="no progress on stderr")
     render.set_defaults(run=_render)
+
+    merging = commands.add_parser("merge", help="one picture of renders with other samples or other seeds")
+    merging.add_argument("pictures", type=Path, nargs="+", help=".exr files written by `render --mergeable`")
+    merging.add_argument("-o", "--output", type=Path, required=True, help="PATH.exr")
+    merging.add_argument("--mergeable", action="store_true", help="keep the sums, to merge on")
+    merging.set_defaults(run=_merge)
 
     info = commands.add_parser("info", help="say what is in a scene")
     info.add_argument("scene", type=Path, help="a .luch file")
@@ -131,11 +143,40 @@ def _render(options: argparse.Namespace) -> int:
             "luch.scene": scene.name,
             **cryptomatte.metadata(scene, "ViewLayer"),
         }
-        image.write_exr(options.output, result.passes, metadata=metadata)
+        passes = dict(result.passes)
+        if result.sums is not None:
+            passes |= result.sums.layers()
+            metadata |= result.sums.header()
+        image.write_exr(options.output, passes, metadata=metadata)
     if options.json is not None:
         record.write_json(options.json, result.stats)
     print(f"{options.output}: {record.line(result.stats)}")
     return CANCELLED if result.cancelled else 0
+
+
+def _merge(options: argparse.Namespace) -> int:
+    from luch import image, merge, record
+    from luch.render import ERROR_PASS, error_pass
+
+    if options.output.suffix.lower() != ".exr":
+        raise ValueError(f"{options.output}: the name must end in .exr")
+    parts, headers = zip(*(merge.read_sums(path) for path in options.pictures), strict=True)
+    whole = merge.merge(parts)
+    film, found = whole.native(), whole.estimate()
+    passes: dict[str, Any] = dict(film.resolve())
+    stats: dict[str, Any] = {"samples": whole.samples, "stopped_by": "merged", "merged": len(parts)}
+    if found is not None:
+        stats |= found.statistics()
+        passes[ERROR_PASS] = error_pass(film.deviations()[1])
+    stats["render_seconds"] = sum(float(header.get("luch.render_seconds", 0.0)) for header in headers)
+    kept = {key: value for key, value in headers[0].items() if key.startswith("cryptomatte/") or key == "luch.scene"}
+    metadata = {**kept, **record.header_fields(stats)}
+    if options.mergeable:
+        passes |= whole.layers()
+        metadata |= whole.header()
+    image.write_exr(options.output, passes, metadata=metadata)
+    print(f"{options.output}: {len(parts)} renders, {record.line(stats)}")
+    return 0
 
 
 def _override(scene: Scene, options: argparse.Namespace) -> None:
@@ -152,6 +193,7 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
         settings.time_limit = options.time
     if options.seed is not None:
         settings.seed = options.seed
+    settings.mergeable, settings.verify = options.mergeable, options.verify
     if options.device is not None:
         settings.device = options.device
     if options.threads is not None:

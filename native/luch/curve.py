@@ -65,7 +65,7 @@ class Curve:
     def estimates(self) -> list[Estimate]:
         """The points' estimates, with what complementary parts overstate taken out."""
         rate, spread = self.rate()
-        return [_corrected(told, share, rate, spread) for _, _, told, share in self.points]
+        return [corrected(told, share, rate, spread) for _, _, told, share in self.points]
 
     @property
     def last(self) -> Estimate | None:
@@ -73,7 +73,7 @@ class Curve:
         if not self.points:
             return None
         _, _, told, share = self.points[-1]
-        return _corrected(told, share, *self.rate())
+        return corrected(told, share, *self.rate())
 
     def seconds_a_sample(self) -> float:
         """From the latter half of the samples; the first are dearer."""
@@ -125,8 +125,8 @@ class Curve:
         return told
 
 
-def _corrected(told: Estimate, share: float, rate: float, spread: float) -> Estimate:
-    """The logarithm of the correction is as uncertain as the rate makes it."""
+def corrected(told: Estimate, share: float, rate: float, spread: float) -> Estimate:
+    """What parts of one sequence overstate taken out (share 0: they are independent). The logarithm of the correction is as uncertain as the rate makes it."""
     rate = max(1.0, rate)
     by = overstated(share, rate)
     step = 0.01

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from luch.accuracy import percent
 from luch.curve import describe
 from luch.effects import summary
 
@@ -27,7 +28,15 @@ def line(stats: Mapping[str, Any]) -> str:
         text += f", {describe(stats)}"
     if stats.get("stopped_by") in ENDS:
         text += f"; {ENDS[stats['stopped_by']]}"
+    if "verified" in stats:
+        text += f"; {verdict(stats['verified'])}"
     return text
+
+
+def verdict(found: Mapping[str, Any]) -> str:
+    """ "verified: claimed 1.8 %, two halves say 1.7 %: the claim holds"."""
+    word = "the claim holds" if found["holds"] else "THE CLAIM DOES NOT HOLD"
+    return f"verified: claimed {percent(found['claimed'])} %, two halves say {percent(found['observed'])} %: {word}"
 
 
 def header_fields(stats: Mapping[str, Any]) -> dict[str, str | int | float]:

@@ -22,6 +22,7 @@ from luch._native import core
 from luch.curve import Curve, Forecast, next_target
 from luch.effects import effects_of
 from luch.effects.removal import without
+from luch.merge import Sums
 from luch.scene import F32, Film, Scene, Settings
 from luch.stopping import Stopping
 from luch.watching import watched
@@ -67,6 +68,7 @@ class Result:
     passes: dict[str, F32]
     stats: dict[str, Any] = field(default_factory=dict)
     cancelled: bool = False
+    sums: Sums | None = None  # for luch.merge, if Settings.mergeable
 
 
 def _preparing(total: int, start: float) -> Progress:
@@ -235,6 +237,12 @@ class _Loop:
         return "error" if self.stopping.reached else "time" if self.timed_out else "samples"
 
 
+def error_pass(deviation: F32) -> F32:
+    """From a film's deviations."""
+    error = accuracy.standard_error(deviation)
+    return np.where(np.isfinite(error), error, UNKNOWN_ERROR)
+
+
 def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) -> Result:
     """Renders ``scene`` as its settings say, until its samples, its time limit or the error asked for are reached.
 
@@ -242,13 +250,17 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     and the film so far is returned (``Result.cancelled``). Raises ValueError for a scene that does not
     fit together, naming the object.
     """
+    if scene.settings.verify:
+        from luch.verify import render_verified
+
+        return render_verified(scene, progress=progress)
     start = time.perf_counter()
     effects = effects_of(scene).as_dict()
     scene = without(scene, scene.settings.without_effects)
     own = [name for name in scene.film.passes if name != ERROR_PASS or name in (aov for aov, _ in scene.film.aovs)]
     wants_error = len(own) < len(scene.film.passes)
     settings = scene.settings
-    if wants_error or settings.error_limit > 0.0:
+    if wants_error or settings.error_limit > 0.0 or settings.mergeable:
         settings = replace(settings, estimate_error=True)
     traced = replace(scene, film=replace(scene.film, passes=own), settings=settings)
     renderer, warnings = _renderer_for(traced)
@@ -276,7 +288,11 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
     stats.update(loop.curve.statistics())
     if wants_error:
-        error = accuracy.standard_error(renderer.deviations()[1])
-        passes[ERROR_PASS] = np.where(np.isfinite(error), error, UNKNOWN_ERROR)
+        passes[ERROR_PASS] = error_pass(renderer.deviations()[1])
     stats["total_seconds"] = time.perf_counter() - start
-    return Result(passes, stats, loop.cancelled)
+    sums = None
+    if settings.mergeable:
+        rows, counts = renderer.film_arrays()
+        sums = Sums(traced.film, scene.origin, np.array(rows), np.array(counts), settings.seed, settings.first_sample,
+                    loop.done, loop.curve.rate())  # fmt: skip
+    return Result(passes, stats, loop.cancelled, sums)

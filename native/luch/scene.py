@@ -210,6 +210,8 @@ class Settings:
     # Several renders of one seed, each with samples of its own, merge into one (luch.merge).
     first_sample: int = 0
     samples_in_all: int = 0  # of all those renders; 0: no others follow
+    mergeable: bool = False  # the result keeps the film's sums
+    verify: bool = False  # two halves of other seeds, held against each other (luch.verify)
     threads: int = 0  # 0: all
     max_bounces: int = 12
     diffuse_bounces: int = 4

@@ -25,6 +25,7 @@ class FakeResult:
     passes: dict[str, Any]
     stats: dict[str, Any]
     cancelled: bool = False
+    sums: None = None
 
 
 @dataclass

@@ -173,6 +173,12 @@ class SeveralDevices:
         passes: dict[str, Any] = self._host.core.passes()
         return passes
 
+    def film_arrays(self) -> tuple[Any, Any]:
+        """As core.render.Renderer's."""
+        self._download()
+        rows, counts = self._host.core.film_arrays()
+        return rows, counts
+
     def deviations(self) -> tuple[Any, Any, float]:
         """As core.render.Renderer's."""
         self._download()
