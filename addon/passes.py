@@ -34,6 +34,8 @@ TABLE = (
     RenderPass("Transmission Direct", "RGB", "COLOR", "use_pass_transmission_direct"),
     RenderPass("Transmission Indirect", "RGB", "COLOR", "use_pass_transmission_indirect"),
     RenderPass("Transmission Color", "RGB", "COLOR", "use_pass_transmission_color"),
+    RenderPass("Volume Direct", "RGB", "COLOR", "cycles.use_pass_volume_direct"),
+    RenderPass("Volume Indirect", "RGB", "COLOR", "cycles.use_pass_volume_indirect"),
     RenderPass("Emission", "RGB", "COLOR", "use_pass_emit"),
     RenderPass("Environment", "RGB", "COLOR", "use_pass_environment"),
     RenderPass("Ambient Occlusion", "RGB", "COLOR", "use_pass_ambient_occlusion"),

@@ -117,6 +117,7 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
     diffuse_bounces: _bounces("Diffuse Bounces", 4, "Bounces off diffuse surfaces on a path")
     glossy_bounces: _bounces("Glossy Bounces", 4, "Bounces off glossy surfaces on a path")
     transmission_bounces: _bounces("Transmission Bounces", 12, "Passages through glass on a path")
+    volume_bounces: _bounces("Volume Bounces", 0, "Scatterings inside volumes on a path, after the first")
     transparent_max_bounces: _bounces("Transparent Max Bounces", 8, "Transparent surfaces a ray passes straight")
     min_light_bounces: _bounces("Min Light Bounces", 0, "Bounces before a path may be ended by chance")
     min_transparent_bounces: _bounces(

@@ -15,6 +15,7 @@ SHARED_WITH_CYCLES = frozenset(
         "diffuse_bounces",
         "glossy_bounces",
         "transmission_bounces",
+        "volume_bounces",
         "transparent_max_bounces",
         "min_light_bounces",
         "min_transparent_bounces",

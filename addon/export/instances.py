@@ -13,13 +13,14 @@ from .derived import object_attributes
 from .lights import export_light
 from .materials import MaterialTable
 from .visibility import instance_visibility
+from .volumes import warn_about_smoke
 
 # Their meshes arrive as instances of their own (Blender 5): exporting these too would double them.
 LISTED_AGAIN_AS_MESH = frozenset({"CURVE", "SURFACE", "FONT", "META"})
 NOTHING_TO_DRAW = frozenset({"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "GREASEPENCIL"})
 NOT_SUPPORTED = {  # type -> what it is, the effect that is missing
     "CURVES": ("hair curves", "hair"),
-    "VOLUME": ("a volume", "volumes"),
+    "VOLUME": ("a volume of grids", "heterogeneous volumes"),
 }
 NO_OBJECT = -1
 NO_INSTANCER_GENERATED = (1.0, 1.0, 1.0)  # an orco of 1 gives generated 0
@@ -78,6 +79,7 @@ class InstanceCollector:
             self._context.warn(
                 f'Object "{subject.name}" uses adaptive subdivision; Luch draws it at its modifier\'s render levels.'
             )
+        warn_about_smoke(subject, self._context)
         linking = subject.light_linking
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
             self._context.warn(

@@ -7,7 +7,8 @@ from typing import Any
 from .attributes import wishes
 from .context import ExportContext
 from .nodes import compile_material
-from .volumes import clear_surface, is_only_volume, warn_about_volume
+from .nodes.media import medium_of
+from .volumes import clear_surface, is_only_volume
 
 # What an empty slot is called in Cryptomatte's manifest by every engine of Blender.
 DEFAULT_NAME = "default_surface"
@@ -43,9 +44,10 @@ class MaterialTable:
             if material is None:
                 compiled.name = DEFAULT_NAME
             else:
-                warn_about_volume("Material", material, self._context)
+                compiled.volume = medium_of(material, f'Material "{material.name}"', self._context)
             if is_only_volume(material):
                 compiled.surface = clear_surface()
+                compiled.only_volume = True
             self._context.result.materials.append(compiled)
             self._wishes.append(wishes(compiled.surface))
         return index

@@ -19,6 +19,7 @@ SAME_NAME = (
     "diffuse_bounces",
     "glossy_bounces",
     "transmission_bounces",
+    "volume_bounces",
     "min_light_bounces",
     "min_transparent_bounces",
     "caustics_reflective",

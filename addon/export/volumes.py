@@ -1,4 +1,4 @@
-"""Volumes, which Luch does not draw yet: named, and drawn as the nothing that they are in thin air."""
+"""Materials that are volumes alone, and volumes that Luch does not draw yet."""
 
 from __future__ import annotations
 
@@ -8,14 +8,19 @@ from luch.scene import Program
 from luch.shader import ProgramBuilder
 
 from .context import ExportContext
+from .nodes.media import UNEVEN
 
 
-def warn_about_volume(kind: str, owner: Any, context: ExportContext) -> None:
-    """Say that a material's or world's volume is missing. kind: "Material" or "World"."""
-    if _is_linked(owner, "Volume"):
-        context.warn(
-            f'{kind} "{owner.name}" has a volume, which Luch does not draw yet: light passes it unchanged.', "volumes"
-        )
+def warn_about_smoke(subject: Any, context: ExportContext) -> None:
+    """Say that an object's simulated smoke or fire is drawn as an even medium."""
+    for modifier in subject.modifiers:
+        domain = getattr(modifier, "domain_settings", None) if modifier.type == "FLUID" else None
+        if domain is not None and domain.domain_type == "GAS":
+            context.warn(
+                f'Object "{subject.name}" holds smoke, whose grid Luch cannot read yet: '
+                "its volume fills the whole domain evenly.",
+                UNEVEN,
+            )
 
 
 def is_only_volume(material: Any) -> bool:

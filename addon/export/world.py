@@ -8,8 +8,8 @@ from luch.scene import World
 
 from .context import ExportContext
 from .nodes import compile_world
+from .nodes.media import medium_of
 from .visibility import CAMERA, DIFFUSE, GLOSSY, SHADOW, TRANSMISSION, VOLUME
-from .volumes import warn_about_volume
 
 
 def export_world(context: ExportContext) -> World | None:
@@ -18,8 +18,8 @@ def export_world(context: ExportContext) -> World | None:
     world: Any = layer.world_override or context.scene.world
     if world is None or not layer.use_sky:
         return None
-    warn_about_volume("World", world, context)
     result = World(name=world.name, program=compile_world(world, context), lightgroup=world.lightgroup)
+    result.volume = medium_of(world, f'World "{world.name}"', context)
     cycles = getattr(world, "cycles", None)
     if cycles is not None:
         result.sampling = cycles.sampling_method

@@ -82,6 +82,7 @@ class LUCH_RENDER_PT_light_paths(LuchPanel, bpy.types.Panel):
             "diffuse_bounces",
             "glossy_bounces",
             "transmission_bounces",
+            "volume_bounces",
             "transparent_max_bounces",
             "min_light_bounces",
             "min_transparent_bounces",

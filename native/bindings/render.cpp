@@ -79,6 +79,7 @@ class PyRenderer {
         facts["registers"] = registers;
         facts["transparent"] = transparent;
         facts["subsurface"] = scene.has_subsurface;
+        facts["media"] = scene.has_media;
         facts["materials"] = scene.view.material_count;
         facts["structure"] = cpu::accel_name({false, renderer_->trees().kind()});
         facts["one_group"] = renderer_->trees().is_one_group();
@@ -117,6 +118,7 @@ class PyRenderer {
         d["subsurface_walks"] = s.counts.subsurface_walks;
         d["subsurface_steps"] = s.counts.subsurface_steps;
         d["subsurface_tree_bytes"] = s.local_tree_bytes;
+        d["flights"] = s.counts.flights;
         return d;
     }
 
@@ -151,6 +153,8 @@ py::dict task_fields() {
     LUCH_FIELD(wave.blocked);
     LUCH_FIELD(wave.walks);
     LUCH_FIELD(wave.aovs);
+    LUCH_FIELD(wave.media);
+    LUCH_FIELD(wave.shadow_media);
     LUCH_FIELD(wave.counters);
     LUCH_FIELD(wave.totals);
     LUCH_FIELD(film.layout.stride);
@@ -168,6 +172,7 @@ py::dict task_sizes() {
     sizes["hit"] = sizeof(Hit);
     sizes["shadow"] = sizeof(ShadowRay);
     sizes["walk"] = sizeof(SubsurfaceWalk);
+    sizes["media"] = sizeof(MediumStack);
     sizes["counters"] = u32(WAVE_COUNTERS);
     sizes["totals"] = u32(TOTALS);
     return sizes;

@@ -131,6 +131,19 @@ struct Reader {
         store.add_mesh(in);
     }
 
+    // Its number among the scene's media; NONE where there is none.
+    u32 read_medium(const py::object& medium) {
+        if (medium.is_none()) return NONE;
+        cpu::MediumInput in;
+        in.absorption = read_color(medium.attr("absorption"));
+        in.emission = read_color(medium.attr("emission"));
+        for (auto phase : py::cast<py::list>(medium.attr("scattering"))) {
+            in.scattering.push_back({py::cast<std::string>(phase.attr("kind")), read_color(phase.attr("scattering")),
+                                     py::cast<float>(phase.attr("a")), py::cast<float>(phase.attr("b"))});
+        }
+        return input.media.add(in);
+    }
+
     void read_material(const py::object& material) {
         MaterialView view{};
         std::string name = py::cast<std::string>(material.attr("name"));
@@ -148,6 +161,8 @@ struct Reader {
         }
         view.transparent_shadows = py::cast<bool>(material.attr("transparent_shadows"));
         view.crypto = crypto_id(name);
+        view.medium = read_medium(material.attr("volume"));
+        view.only_volume = view.medium != NONE && py::cast<bool>(material.attr("only_volume"));
         store.add_material(view);
         input.material_emission_estimate.push_back(read_color(material.attr("emission_estimate")));
     }
@@ -293,6 +308,7 @@ struct Reader {
         input.world.visibility = py::cast<u32>(world.attr("visibility"));
         input.world.max_bounces = py::cast<u32>(world.attr("max_bounces"));
         input.world.lightgroup = lightgroup_index(lightgroups, py::cast<std::string>(world.attr("lightgroup")));
+        input.media.set_world(read_medium(world.attr("volume")));
         std::string sampling = py::cast<std::string>(world.attr("sampling"));
         input.world_map_width = sampling == "NONE"     ? 0
                                 : sampling == "MANUAL" ? py::cast<int>(world.attr("map_resolution"))
@@ -374,6 +390,7 @@ struct Reader {
         limits.diffuse = count("diffuse_bounces") + 1;
         limits.glossy = count("glossy_bounces") + 1;
         limits.transmission = count("transmission_bounces") + 1;
+        limits.volume = count("volume_bounces") + 1;
         limits.transparent = count("transparent_bounces");
         limits.min_bounces = count("min_light_bounces") + 1;
         limits.min_transparent = count("min_transparent_bounces") + 1;

@@ -46,6 +46,8 @@ const Known known_passes[] = {
     {"Transmission Indirect", 3, PassKind::DIVIDED_LIGHT, &FilmLayout::transmission_indirect,
      &FilmLayout::transmission_color, LIGHT_PASS},
     {"Transmission Color", 3, PassKind::MEAN, &FilmLayout::transmission_color, nothing, DATA_PASS},
+    {"Volume Direct", 3, PassKind::LIGHT, &FilmLayout::volume_direct, nothing, LIGHT_PASS},
+    {"Volume Indirect", 3, PassKind::LIGHT, &FilmLayout::volume_indirect, nothing, LIGHT_PASS},
     {"Denoising Albedo", 3, PassKind::MEAN, &FilmLayout::denoising_albedo, nothing, DATA_PASS},
     {"Denoising Normal", 3, PassKind::MEAN, &FilmLayout::denoising_normal, nothing, DATA_PASS},
     {"Denoising Depth", 1, PassKind::MEAN, &FilmLayout::denoising_depth, nothing, DATA_PASS},

@@ -98,6 +98,27 @@ class Program:
 
 
 @dataclass
+class Phase:
+    """A part of a medium's scattering: how much, and by which phase function (native/include/luch/bsdf/phase.h)."""
+
+    # "HENYEY_GREENSTEIN" (a: anisotropy), "DRAINE" (a: anisotropy, b: alpha), "FOURNIER_FORAND" (a: the particles'
+    # index of refraction, b: share of the light that is scattered back).
+    kind: str
+    scattering: tuple[float, float, float]  # coefficient, per metre
+    a: float = 0.0
+    b: float = 0.0
+
+
+@dataclass
+class Medium:
+    """What fills a volume, the same everywhere in it."""
+
+    absorption: tuple[float, float, float] = (0.0, 0.0, 0.0)  # coefficient, per metre
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)  # radiance that a metre adds
+    scattering: list[Phase] = field(default_factory=list)
+
+
+@dataclass
 class Material:
     name: str
     surface: Program
@@ -105,6 +126,8 @@ class Material:
     emission_sampling: str = "AUTO"  # "NONE", "AUTO", "FRONT", "BACK", "FRONT_BACK"
     transparent_shadows: bool = True
     emission_estimate: tuple[float, float, float] = (0.0, 0.0, 0.0)  # typical radiance, for choosing lights
+    volume: Medium | None = None  # what lies behind the surface
+    only_volume: bool = False  # there is no surface: rays pass as if it were not there
 
 
 @dataclass
@@ -154,6 +177,7 @@ class World:
     map_resolution: int = 1024
     max_bounces: int = 1024
     lightgroup: str = ""
+    volume: Medium | None = None  # everywhere, beside what volumes hold
 
 
 @dataclass
@@ -217,6 +241,7 @@ class Settings:
     diffuse_bounces: int = 4
     glossy_bounces: int = 4
     transmission_bounces: int = 12
+    volume_bounces: int = 0
     transparent_bounces: int = 8
     min_light_bounces: int = 0
     min_transparent_bounces: int = 0

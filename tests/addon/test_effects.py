@@ -91,9 +91,10 @@ def motion(scene: bpy.types.Scene) -> None:
     scene.render.use_motion_blur = True
 
 
-def volume(scene: bpy.types.Scene) -> None:
+def uneven_volume(scene: bpy.types.Scene) -> None:
     tree = bpy.data.materials["Leaves"].node_tree
-    fog = tree.nodes.new("ShaderNodeVolumeScatter")
+    fog, noise = tree.nodes.new("ShaderNodeVolumeScatter"), tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs[0], fog.inputs["Density"])
     tree.links.new(fog.outputs[0], tree.nodes["Material Output"].inputs["Volume"])
 
 
@@ -109,7 +110,7 @@ def displaced(scene: bpy.types.Scene) -> None:
     ("effect", "ask", "who"),
     [
         ("motion blur", motion, "Scene"),
-        ("volumes", volume, "Leaves"),
+        ("heterogeneous volumes", uneven_volume, "Leaves"),
         ("displacement", displaced, "Leaves"),
     ],
 )

@@ -195,7 +195,7 @@ def test_slots_show_their_materials_and_a_slot_of_the_object_wins(scene: bpy.typ
     assert sorted(result.meshes[0].material_slots) == [0] * 10 + [1] * 2
 
 
-def test_a_volume_is_named_and_its_surface_lets_light_pass(scene: bpy.types.Scene) -> None:
+def test_a_material_of_a_volume_alone_has_a_surface_that_lets_light_pass(scene: bpy.types.Scene) -> None:
     bpy.ops.mesh.primitive_cube_add()
     fog = bpy.data.materials.new("Fog")
     fog.node_tree.nodes.clear()
@@ -204,7 +204,10 @@ def test_a_volume_is_named_and_its_surface_lets_light_pass(scene: bpy.types.Scen
     fog.node_tree.links.new(scatter.outputs[0], output.inputs["Volume"])
     bpy.context.object.data.materials.append(fog)
     result = export()
-    assert result.warnings == ['Material "Fog" has a volume, which Luch does not draw yet: light passes it unchanged.']
+    assert result.warnings == []
+    fog_medium = result.materials[0].volume
+    assert fog_medium is not None and result.materials[0].only_volume
+    assert fog_medium.scattering[0].scattering == pytest.approx((0.8, 0.8, 0.8))
     assert result.materials[0].surface.flags & TRANSPARENT
 
 

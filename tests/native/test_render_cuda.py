@@ -16,6 +16,7 @@ from luch.render import Progress, render
 from luch.scene import Image, Instances, Material, Scene
 from luch.shader import ProgramBuilder
 from support.cuda_on_cpu import FIBERS
+from support.devices import both, check_equal
 from support.effects import closure, program
 from support.everything import everything
 
@@ -24,24 +25,6 @@ LIGHT_PASSES = ["Emission", "Environment", "Ambient Occlusion", "Diffuse Direct"
                 "Transmission Color"]  # fmt: skip
 FIRST_PASSES = ["Depth", "Position", "Object Index", "Material Index"]
 DATA_PASSES = ["Mist", "Normal", "UV", "Denoising Albedo", "Denoising Normal", "CryptoObject00", "CryptoMaterial00"]
-
-
-def both(scene: Scene) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """Passes and statistics, CPU's and CUDA's."""
-    ours = render(replace(scene, settings=replace(scene.settings, device="CUDA")))
-    assert ours.stats["device"].startswith("CUDA"), ours.stats["warnings"]
-    cpu = render(scene)
-    return cpu.passes, cpu.stats, ours.passes, ours.stats
-
-
-def check_equal(name: str, cpu: Any, ours: Any, place: str) -> None:
-    """fibers: but for the order of double sums. GPU: a few of its functions differ in the last bit, so a path may turn."""
-    assert np.isfinite(ours).all(), name
-    if place == FIBERS:
-        np.testing.assert_allclose(ours, cpu, rtol=2e-6, atol=1e-7, err_msg=name)
-        return
-    differ = ~np.isclose(ours, cpu, rtol=1e-4, atol=1e-5)
-    assert differ.mean() < 0.01, (name, differ.mean())
 
 
 def test_the_picture_is_the_cpus(place: str) -> None:

@@ -82,7 +82,7 @@ def compile_module(
 
     shares_memory: False gives every thread an array of its own where the source says __shared__.
     """
-    text = _reached(source, include[1])
+    text = _planned(_reached(source, include[1]), defines)
     names = sorted(set(re.findall(r"LUCH_\w*KERNEL\((\w+)\)\(LUCH_ARGUMENTS\)", text)))
     builds = re.findall(r"LUCH_BUILD_KERNEL\((\w+)\)\(const luch::BuildTask", text)
     traces = re.findall(r"LUCH_\w*TRACE_KERNEL\((\w+)\)\(LUCH_TRACE_ARGUMENTS\)", text)
@@ -129,6 +129,13 @@ def _types(parameters: str) -> list[str]:
         parameter.replace("__grid_constant__", "").replace("const ", "").split() for parameter in parameters.split(",")
     ]
     return [{"u32": "luch::u32"}.get(word[0], word[0]) for word in words]
+
+
+def _planned(text: str, defines: Sequence[str]) -> str:
+    """Without the kernels of effects that the plan leaves out."""
+    for absent in re.findall(r"-D(LUCH_PLAN_\w+)=0", " ".join(defines)):
+        text = re.sub(rf"^#if {absent}$.*?^#endif$", "", text, flags=re.MULTILINE | re.DOTALL)
+    return text
 
 
 def _reached(source: Path, kernels: Path) -> str:

@@ -111,6 +111,11 @@ class Compiler:
         """Whether something feeds the input."""
         return (node.name, identifier) in self._links
 
+    def source(self, node: bpy.types.Node, identifier: str) -> bpy.types.Node | None:
+        """The node that feeds the input; None if nothing does."""
+        link = self._links.get((node.name, identifier))
+        return link.from_node if link is not None else None
+
     def float(self, node: bpy.types.Node, identifier: str) -> Value:
         """Input as one float: a colour gives its luminance, a vector its mean."""
         link = self._links.get((node.name, identifier))

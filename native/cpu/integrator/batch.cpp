@@ -22,13 +22,16 @@ Batch::Batch(const RenderScene& scene, const FilmView& film)
     hits_.resize(BATCH_PATHS);
     sorted_.resize(BATCH_PATHS);
     hit_material_.resize(BATCH_PATHS);
-    // A path casts one shadow ray and one for ambient occlusion at each point, and one where it leaves a medium.
-    size_t shadows = size_t(BATCH_PATHS) * (scene.has_subsurface ? 3 : 2);
+    // A path casts one shadow ray and one for ambient occlusion at each point, one where it leaves a medium under a
+    // surface, and one on its way through a volume.
+    const size_t shadows = size_t(BATCH_PATHS) * size_t(2 + scene.has_subsurface + scene.has_media);
     shadow_rays_.resize(shadows);
     shadows_.resize(shadows);
     shadow_kind_.resize(shadows);
     blocked_.resize(shadows);
     if (scene.has_subsurface) walks_.resize(BATCH_PATHS);
+    media_.resize(scene.has_media ? BATCH_PATHS : 0);
+    shadow_media_.resize(scene.has_media ? shadows : 0);
     material_first_.resize(scene.view.material_count + 1);
     aovs_.resize(size_t(film.layout.aov_count) * 4 * SHADE_LANES);
 }
@@ -48,6 +51,7 @@ void BatchCounts::add(const BatchCounts& other) {
     light_points += other.light_points;
     subsurface_walks += other.subsurface_walks;
     subsurface_steps += other.subsurface_steps;
+    flights += other.flights;
 }
 
 BatchCounts Batch::counts() const {
@@ -59,12 +63,13 @@ BatchCounts Batch::counts() const {
 void Batch::trace(const PixelBlock& block) {
     generate(block);
     while (ray_count_ > 0) {
+        next_count_ = 0;
+        shadow_count_ = 0;
         traverse();
+        if (scene_.has_media) cross_media();
         meet_lamps();
         shade_misses();
         sort_hits_by_material();
-        next_count_ = 0;
-        shadow_count_ = 0;
         walk_count_ = 0;
         shade_hits();
         if (walk_count_ > 0) walk_subsurface();
@@ -111,6 +116,10 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
         rays_[k] = begin_path(scene_, writer_.film, px, py, sample, make_sampler(pixel, sample),
                               {filter_u[0][i], filter_u[1][i]}, {lens_u[0][i], lens_u[1][i]}, paths_[k]);
         ray_path_[k] = u32(k);
+        if (scene_.has_media) {
+            OnePoint one{*this};
+            media_[k] = media_at_lens(scene_, rays_[k].origin, one);
+        }
     }
 }
 
@@ -121,11 +130,12 @@ void Batch::traverse() {
 }
 
 void Batch::meet_lamps() {
-    if (!scene_.has_visible_lamps) return;
+    if (!scene_.has_visible_lamps || scene_.has_media) return;  // through media: cross_media
     counts_.lamp_searches += u64(ray_count_);
     OnePoint shader{*this};
     for (int k = 0; k < ray_count_; k++)
-        find_lamps(scene_, writer_, paths_[ray_path_[k]], rays_[k], hits_[k].t, shader, scratch_->light_points);
+        find_lamps(scene_, writer_, paths_[ray_path_[k]], rays_[k], hits_[k].t, nullptr, shader,
+                   scratch_->light_points);
 }
 
 void Batch::shade_misses() {
@@ -133,7 +143,7 @@ void Batch::shade_misses() {
     u32 chunk[SHADE_LANES];
     int count = 0;
     for (int k = 0; k < ray_count_; k++) {
-        if (hits_[k].instance != NONE) continue;
+        if (!missed_all(hits_[k])) continue;
         if (!leave_scene(scene_, writer_, paths_[ray_path_[k]], rays_[k], shader, scratch_->light_points)) continue;
         chunk[count++] = u32(k);
         if (count == SHADE_LANES) {
@@ -179,6 +189,11 @@ void Batch::shade_hits() {
     u32 begin = 0;
     for (u32 m = 0; m < scene_.view.material_count; m++) {
         u32 end = material_first_[m];
+        if (scene_.view.materials[m].only_volume) {
+            pass_borders(begin, end);
+            begin = end;
+            continue;
+        }
         u32 chunk[SHADE_LANES];
         int count = 0;
         for (u32 i = begin; i < end; i++) {
@@ -207,8 +222,11 @@ void Batch::trace_shadows() {
         if (shadow.casts) {
             if (blocked_[k] == BLOCKED_OPAQUE) continue;
             if (blocked_[k] == BLOCKED_MAYBE) {
-                through = walk_transparent(scene_, shadow_rays_[k], shadow, one, one, scratch_->light_points,
+                MediumStack* stack = scene_.has_media ? &shadow_media_[k] : nullptr;
+                through = walk_transparent(scene_, shadow_rays_[k], shadow, stack, one, one, scratch_->light_points,
                                            &counts_.transparent_steps, &counts_.shadow_rays);
+            } else if (scene_.has_media) {
+                through = media_transmittance(scene_.media, shadow_media_[k], shadow_rays_[k].t_max);
             }
         }
         if (!is_zero(through)) add_direct(scene_, writer_, path, shadow, through);

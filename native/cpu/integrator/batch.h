@@ -7,8 +7,8 @@
 #include "cpu/accel/accel.h"
 #include "cpu/integrator/render_scene.h"
 #include "cpu/shade/interpreter.h"
-#include "luch/integrator/direct_light.h"
 #include "luch/integrator/subsurface.h"
+#include "luch/integrator/volume.h"
 #include "luch/shade/surface_setup.h"
 
 namespace luch::cpu {
@@ -26,6 +26,7 @@ struct BatchCounts {
     u64 world_points = 0;       // directions in which the world's program ran for a ray
     u64 light_points = 0;       // points on lights at which a program ran
     u64 subsurface_walks = 0, subsurface_steps = 0;
+    u64 flights = 0;            // ways of rays through media
 
     void add(const BatchCounts& other);
 };
@@ -58,8 +59,14 @@ class Batch {
     void shade_hits();
     void trace_shadows();
 
+    // cross_media.cpp: what lies between surfaces, where the scene has media
+    void cross_media();
+    void cross_media(int k);
+    void pass_borders(u32 begin, u32 end);
+
     // shade_surface.cpp: one chunk of points that share a material
     void shade_chunk(u32 material, const u32* queue, int count);
+    void send_next(const ShadePoints& points, int lane);
     void setup_chunk(const u32* queue, int count, ShadePoints& points);
     void draw_numbers(const u32* queue, int lit_count);
 
@@ -94,6 +101,7 @@ class Batch {
     std::vector<ShadowRay> shadows_;
     std::vector<u32> shadow_kind_;
     std::vector<u8> blocked_;
+    std::vector<MediumStack> media_, shadow_media_;  // by path, by shadow ray; empty without media
 
     int walk_count_ = 0;
     std::vector<SubsurfaceWalk> walks_;  // of this generation; none where nothing scatters under its surface

@@ -23,9 +23,13 @@ void Batch::sample_lights(const u32* queue, int lit_count) {
     for (int i = 0; i < wanted_count; i++) {
         int lane = wanted[i];
         u32 path = ray_path_[queue[lane]];
-        push_shadow(make_shadow_ray(writer_.film.layout, paths_[path], path, points, lane, scratch_->sets[lane],
-                                    scratch_->spawn[lane], scratch_->samples[lane], scratch_->emission[lane],
-                                    &shadow_rays_[shadow_count_], &shadows_[shadow_count_]));
+        Ray& ray = shadow_rays_[shadow_count_];
+        bool made = make_shadow_ray(writer_.film.layout, paths_[path], path, points, lane, scratch_->sets[lane],
+                                    scratch_->spawn[lane], scratch_->samples[lane], scratch_->emission[lane], &ray,
+                                    &shadows_[shadow_count_]);
+        if (made && scene_.has_media)
+            shadow_media_[shadow_count_] = media_towards(scene_, media_[path], points, lane, ray.direction);
+        push_shadow(made);
     }
 }
 

@@ -75,6 +75,11 @@ void Renderer::build_all() {
     scene_.mist_start = input_.mist_start;
     scene_.mist_inverse_depth = input_.mist_depth > 0.0f ? 1.0f / input_.mist_depth : 0.0f;
     scene_.mist_exponent = input_.mist_exponent;
+    scene_.has_media = input_.media.shown(scene_.view);
+    if (scene_.has_media) {
+        scene_.media =
+            input_.media.view(scene_.view, scene_.camera, float(input_.frame_width), float(input_.frame_height));
+    }
     find_constants();
     start = seconds_now();
     build_lights();
@@ -141,6 +146,7 @@ DeviceImage Renderer::device_image() {
     u32 block = image.add("task", &task_, sizeof(task_));
     store_->describe(image, block, task_.scene.view);
     image.link(block, &task_.scene.view.lights, lights_.describe(image));
+    input_.media.describe(image, block, task_.scene.media);
     image.add_array("camera", block, task_.scene.view.camera, 1);
     image.add_array("filter", block, task_.scene.filter, 1);
     if (task_.scene.local_trees) local_trees_->describe(image, block, task_.scene.local_trees);
@@ -261,6 +267,9 @@ void Renderer::build_lights() {
     }
     for (u32 m = 0; m < scene_.view.material_count; m++) {
         if (scene_.view.materials[m].program.flags & PROGRAM_EMISSION) scene_.can_meet_light = true;
+    }
+    for (u32 m = 0; scene_.has_media && m < scene_.media.count; m++) {
+        if (!is_zero(scene_.media.media[m].emission)) scene_.can_meet_light = true;
     }
 }
 

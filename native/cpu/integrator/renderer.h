@@ -16,6 +16,7 @@
 #include "cpu/scene_store.h"
 #include "cpu/sky/world_sun.h"
 #include "cpu/thread_pool.h"
+#include "cpu/volume/media.h"
 #include "luch/integrator/wavefront.h"
 
 namespace luch::cpu {
@@ -33,6 +34,7 @@ struct ForcedWork {
 struct RenderInput {
     std::vector<LampInput> lamps;
     WorldInput world;
+    MediaStore media;
     int world_map_width = 0;  // of the importance map, 0: no map
     std::vector<Color> material_emission_estimate;
     bool light_tree = true;

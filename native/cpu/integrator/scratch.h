@@ -26,8 +26,9 @@ struct Batch::OnePoint {
                     Wanted::LIGHT);
         return batch.scratch_->light_sets[0];
     }
-    Hit closest(const Ray& ray) {
-        u32 kind = RAY_SHADOW;
+    Hit closest(const Ray& ray) { return closest(ray, RAY_SHADOW); }
+    Hit closest_of_all(const Ray& ray) { return closest(ray, RAY_ALL); }
+    Hit closest(const Ray& ray, u32 kind) {
         Hit hit;
         batch.scene_.accel->closest(&ray, &kind, &hit, 1);
         return hit;

@@ -35,14 +35,24 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
         if (wants_ao(writer_.film.layout, path)) {
             make_ao_ray(scene_, path, path_index, points, lane, set, spawn, &shadow_rays_[shadow_count_],
                         &shadows_[shadow_count_]);
+            if (scene_.has_media) shadow_media_[shadow_count_] = media_[path_index];
             push_shadow(true);
         }
         if (scene_.has_subsurface && enters_subsurface(k, lane, set, spawn, {u[0][i], u[1][i], u[2][i]})) continue;
         next_path_[next_count_] = path_index;
         if (scatter(scene_, writer_.film.layout, path, points, lane, set, spawn, {u[0][i], u[1][i], u[2][i]},
                     rays_[k].direction, hits_[k].t, &next_rays_[next_count_], &writer_.rejected))
-            next_count_++;
+            send_next(points, lane);
     }
+}
+
+// The next ray, which stands at the end of its queue, goes on.
+void Batch::send_next(const ShadePoints& points, int lane) {
+    if (scene_.has_media) {
+        MediumStack& media = media_[next_path_[next_count_]];
+        media = media_towards(scene_, media, points, lane, next_rays_[next_count_].direction);
+    }
+    next_count_++;
 }
 
 // All random numbers of the chunk in two loops, which vectorise: one by one they took a tenth of the time.

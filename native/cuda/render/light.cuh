@@ -8,8 +8,9 @@ LUCH_STAGE(find_light) {
     const Wavefront& wave = task.wave;
     u32 k = stage_index();
     if (k >= wave.counters[WAVE_RAYS]) return;
-    bool missed = wave.hits[k].instance == NONE;
-    bool lamps = plan::LAMPS && task.scene.has_visible_lamps;
+    bool missed = missed_all(wave.hits[k]);
+    // Lamps that are seen through media: cross_media.
+    bool lamps = plan::LAMPS && task.scene.has_visible_lamps && !(plan::VOLUMES && wave.media);
     if (!missed && !lamps) return;
     u32 slot = wave.ray_slot[k];
     PathState path = load_path(wave, slot);
@@ -18,7 +19,7 @@ LUCH_STAGE(find_light) {
     ShadePoints points;
     ClosureSet set;
     PointShader shader{task.scene.view, set};
-    if (lamps) find_lamps(task.scene, writer, path, ray, wave.hits[k].t, shader, points);
+    if (lamps) find_lamps(task.scene, writer, path, ray, wave.hits[k].t, nullptr, shader, points);
     if (missed && leave_scene(task.scene, writer, path, ray, shader, points)) {
         Color radiance = task.scene.world_emission.radiance;
         if (!task.scene.world_emission.constant) {

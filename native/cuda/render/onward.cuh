@@ -1,9 +1,18 @@
 // What happens to a path at any surface: a light for it, and where it goes on.
 #pragma once
-#include "luch/integrator/direct_light.h"
+#include "luch/integrator/volume.h"
 #include "render/stage.cuh"
 
 namespace luch {
+
+// The media of a path, and those that a ray leaving its surface in a direction meets; nothing without media.
+__device__ __forceinline__ const MediumStack* media_of(const Wavefront& wave, u32 slot) {
+    return plan::VOLUMES && wave.media ? wave.media + slot : nullptr;
+}
+__device__ __forceinline__ MediumStack beyond(const RenderTask& task, u32 slot, const ShadePoints& points,
+                                              Vec3 direction) {
+    return media_towards(task.scene, task.wave.media[slot], points, 0, direction);
+}
 
 // Emission of a light's program at the sampled place.
 __device__ __forceinline__ Color sampled_emission(const RenderTask& task, const PathState& path, u32 slot,
@@ -19,10 +28,11 @@ __device__ __forceinline__ Color sampled_emission(const RenderTask& task, const 
     return set.emission;
 }
 
-__device__ __forceinline__ void push_shadow(const Wavefront& wave, const Ray& ray, const ShadowRay& shadow) {
-    u32 at = append(wave, WAVE_SHADOWS);
-    wave.shadow_rays[at] = ray;
-    wave.shadows[at] = shadow;
+__device__ __forceinline__ void push_shadow(const RenderTask& task, u32 slot, const ShadePoints& points, const Ray& ray,
+                                            const ShadowRay& shadow) {
+    MediumStack media;
+    if (plan::VOLUMES && task.wave.media) media = beyond(task, slot, points, ray.direction);
+    push_shadow(task.wave, ray, shadow, plan::VOLUMES && task.wave.media ? &media : nullptr);
 }
 
 __device__ __noinline__ void light_surface(const RenderTask& task, const PathState& path, u32 slot,
@@ -35,7 +45,7 @@ __device__ __noinline__ void light_surface(const RenderTask& task, const PathSta
     Ray ray;
     ShadowRay shadow;
     if (make_shadow_ray(task.film.layout, path, slot, points, 0, set, spawn, sample, emission, &ray, &shadow))
-        push_shadow(task.wave, ray, shadow);
+        push_shadow(task, slot, points, ray, shadow);
 }
 
 // The path's next ray, if it goes on.
@@ -49,10 +59,8 @@ __device__ __noinline__ void send_on(const RenderTask& task, PathState& path, u3
         scatter(task.scene, task.film.layout, path, points, 0, set, spawn, u, direction, distance, &next, &rejected);
     add_total(wave, TOTAL_REJECTED, rejected);
     if (!goes_on) return;
-    u32 at = append(wave, WAVE_NEXT_RAYS);
-    wave.next_rays[at] = next;
-    wave.next_slot[at] = slot;
-    wave.next_kind[at] = path.visibility;
+    if (plan::VOLUMES && wave.media) wave.media[slot] = beyond(task, slot, points, next.direction);
+    push_ray(wave, next, slot, path.visibility);
 }
 
 }  // namespace luch

@@ -1,25 +1,20 @@
 // The stage after shadow rays were traced: what reached its light enters the film.
 #pragma once
-#include "luch/accel/two_level.h"
 #include "luch/integrator/direct_light.h"
+#include "render/one_ray.cuh"
 #include "render/stage.cuh"
 
 namespace luch {
 
-using SceneTrees = TwoLevelView<LUCH_STRUCTURE>;
-
-// One ray, for those that look through surfaces one by one.
-struct OneRay {
-    const SceneTrees& trees;
-    __device__ __noinline__ Hit closest(const Ray& ray) {
-        return closest_hit<Precision::LUCH_PRECISION>(trees, ray, RAY_SHADOW);
-    }
-};
-
 __device__ __forceinline__ Color shadow_transmittance(const RenderTask& task, const SceneTrees& trees, u32 k,
                                                       const ShadowRay& shadow) {
     const Wavefront& wave = task.wave;
-    if (!shadow.casts || wave.blocked[k] == BLOCKED_NOT) return make_vec3(1.0f);
+    if (!shadow.casts) return make_vec3(1.0f);
+    bool media = plan::VOLUMES && wave.media;
+    if (wave.blocked[k] == BLOCKED_NOT) {
+        if (!media) return make_vec3(1.0f);
+        return media_transmittance(task.scene.media, wave.shadow_media[k], wave.shadow_rays[k].t_max);
+    }
 #if LUCH_TRANSPARENT
     if (wave.blocked[k] == BLOCKED_MAYBE) {
         ShadePoints points;
@@ -27,8 +22,9 @@ __device__ __forceinline__ Color shadow_transmittance(const RenderTask& task, co
         PointShader shader{task.scene.view, set};
         OneRay tracer{trees};
         u64 steps = 0, rays = 0;
+        MediumStack* stack = media ? wave.shadow_media + k : nullptr;
         Color through =
-            walk_transparent(task.scene, wave.shadow_rays[k], shadow, tracer, shader, points, &steps, &rays);
+            walk_transparent(task.scene, wave.shadow_rays[k], shadow, stack, tracer, shader, points, &steps, &rays);
         add_total(wave, TOTAL_TRANSPARENT_STEPS, steps);
         add_total(wave, TOTAL_TRANSPARENT_RAYS, rays);
         return through;

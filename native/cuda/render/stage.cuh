@@ -18,6 +18,22 @@ __device__ __forceinline__ void add_total(const Wavefront& wave, WaveTotal total
     if (amount != 0) atomicAdd(wave.totals + total, amount);
 }
 
+// media: around the ray's beginning; null without any.
+__device__ __forceinline__ void push_shadow(const Wavefront& wave, const Ray& ray, const ShadowRay& shadow,
+                                            const MediumStack* media) {
+    u32 at = append(wave, WAVE_SHADOWS);
+    wave.shadow_rays[at] = ray;
+    wave.shadows[at] = shadow;
+    if (plan::VOLUMES && media) wave.shadow_media[at] = *media;
+}
+
+__device__ __forceinline__ void push_ray(const Wavefront& wave, const Ray& ray, u32 slot, u32 kind) {
+    u32 at = append(wave, WAVE_NEXT_RAYS);
+    wave.next_rays[at] = ray;
+    wave.next_slot[at] = slot;
+    wave.next_kind[at] = kind;
+}
+
 __device__ __forceinline__ OpContext context_of(const SceneView& scene, const Program& program,
                                                 const ShadePoints& points, ClosureSet& set, float* aovs) {
     clear_closures(set);

@@ -7,5 +7,6 @@
 #endif
 #include "render/exits.cuh"
 #include "render/light.cuh"
+#include "render/media.cuh"
 #include "render/shadow.cuh"
 #include "render/surface.cuh"

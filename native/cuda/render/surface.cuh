@@ -5,6 +5,16 @@
 
 namespace luch {
 
+// The path goes on through a surface that is only the border of a volume.
+__device__ __noinline__ void pass_border(const RenderTask& task, PathState& path, u32 slot, const Hit& hit, Ray ray) {
+    const Wavefront& wave = task.wave;
+    path.travelled += hit.t;
+    ray.t_min = 0.0f, ray.t_max = INFINITE_DISTANCE;
+    pass_surface(task.scene.view, wave.media[slot], hit, &ray);
+    store_path(wave, slot, path);
+    push_ray(wave, ray, slot, path.visibility);
+}
+
 // entry: of the sorted queue. True when the surface was shaded.
 __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
     const Wavefront& wave = task.wave;
@@ -15,6 +25,10 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
     u32 material_index = material_at(scene.view, hit.instance, hit.prim);
     const MaterialView& material = scene.view.materials[material_index];
     PathState path = load_path(wave, slot);
+    if (plan::VOLUMES && material.only_volume) {
+        pass_border(task, path, slot, hit, ray);
+        return false;
+    }
     if (!survives(scene, path, material)) return false;
     FilmWriter writer = film_of_slot(task, slot);
     ShadePoints points;
@@ -32,7 +46,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
             Ray ao_ray;
             ShadowRay ao;
             make_ao_ray(scene, path, slot, points, 0, set, spawn, &ao_ray, &ao);
-            push_shadow(wave, ao_ray, ao);
+            push_shadow(wave, ao_ray, ao, media_of(wave, slot));
         }
         bool inside = plan::SUBSURFACE && scene.has_subsurface && goes_inside(task, path, points, set, spawn, k);
         if (!inside) send_on(task, path, slot, points, set, spawn, ray.direction, hit.t);

@@ -54,6 +54,9 @@
 #ifndef LUCH_PLAN_SUBSURFACE
 #define LUCH_PLAN_SUBSURFACE 1
 #endif
+#ifndef LUCH_PLAN_VOLUMES
+#define LUCH_PLAN_VOLUMES 1
+#endif
 
 namespace luch::plan {
 
@@ -74,5 +77,6 @@ inline constexpr bool FILTER_GLOSSY = LUCH_PLAN_FILTER_GLOSSY;
 inline constexpr bool HOLDOUT = LUCH_PLAN_HOLDOUT;
 inline constexpr bool CLAMPING = LUCH_PLAN_CLAMPING;
 inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin walls
+inline constexpr bool VOLUMES = LUCH_PLAN_VOLUMES;
 
 }  // namespace luch::plan

@@ -20,7 +20,7 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "WORLD_SAMPLING": ("world light sampling",),
     "LIGHT_PASSES": ("pass Diffuse Direct", "pass Diffuse Indirect", "pass Glossy Direct", "pass Glossy Indirect",
                      "pass Transmission Direct", "pass Transmission Indirect", "pass Emission", "pass Environment",
-                     "pass Ambient Occlusion", "light groups"),
+                     "pass Volume Direct", "pass Volume Indirect", "pass Ambient Occlusion", "light groups"),
     "DATA_PASSES": ("pass Depth", "pass Mist", "pass Position", "pass Normal", "pass UV", "pass Object Index",
                     "pass Material Index", "pass Diffuse Color", "pass Glossy Color", "pass Transmission Color",
                     "pass Diffuse Direct", "pass Diffuse Indirect", "pass Glossy Direct", "pass Glossy Indirect",
@@ -32,6 +32,7 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "HOLDOUT": ("holdout",),
     "CLAMPING": ("clamping",),
     "SUBSURFACE": ("subsurface",),
+    "VOLUMES": ("volumes",),
 }  # fmt: skip
 # Define -> operations of shader programs that make such lobes.
 MADE_BY: dict[str, tuple[str, ...]] = {

@@ -38,19 +38,19 @@ MARK_CHANNELS = 4  # of luch/film/film.h
 RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
 COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed", "walks", "walked")  # WaveCounter
 TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
-          "light_points", "subsurface_walks", "subsurface_steps")  # WaveTotal  # fmt: skip
+          "light_points", "subsurface_walks", "subsurface_steps", "flights")  # WaveTotal  # fmt: skip
 
 
 class Memory:
     """The film and the wavefront on the device, and their places in the RenderTask."""
 
-    def __init__(self, task: bytes, pixels: int, materials: int, paths: int, walks: bool) -> None:
-        """walks: paths may go under surfaces."""
+    def __init__(self, task: bytes, pixels: int, materials: int, paths: int, walks: bool, media: bool) -> None:
+        """walks: paths may go under surfaces; media: and through volumes."""
         cp, fields, sizes = cupy(), core.render.task_fields(), core.render.task_sizes()
         self._fields, self._task = fields, bytearray(task)
         stride = self.field("film.layout.stride", "<I")
         aovs = self.field("film.layout.aov_count", "<I")
-        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE) + walks
+        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE) + walks + media
         self.layer_pixels = min(pixels, paths)
         self.layers = max(1, paths // pixels)
         slots = self.slots = self.layer_pixels * self.layers
@@ -84,6 +84,9 @@ class Memory:
             self.arrays["walks"] = empty(slots * sizes["walk"])
         if aovs:
             self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
+        if media:
+            self.arrays["media"] = empty(slots * sizes["media"])
+            self.arrays["shadow_media"] = empty(slots * shadows * sizes["media"])
         self._set("film.rows", "<Q", self.rows.data.ptr)
         self._set("film.sample_counts", "<Q", self.counts.data.ptr)
         self._set("wave.slots", "<I", slots)
@@ -144,12 +147,13 @@ def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
         first += count
 
 
-def bytes_per_path(stride: int, pixels: int, walks: bool = False) -> float:
+def bytes_per_path(stride: int, pixels: int, walks: bool = False, media: bool = False) -> float:
     """Device memory of one path under way: its state, its queues, and its part of a layer of the film."""
     sizes = core.render.task_sizes()
-    queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + 2 * (sizes["ray"] + sizes["shadow"] + 5)
-    inside = walks * (sizes["walk"] + sizes["ray"] + sizes["shadow"] + 5)
-    return float(sizes["path"] + queues + inside + 8 * stride + 4)
+    shadow = sizes["ray"] + sizes["shadow"] + 5 + media * sizes["media"]
+    queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + (2 + walks + media) * shadow
+    beside = walks * sizes["walk"] + media * sizes["media"]
+    return float(sizes["path"] + queues + beside + 8 * stride + 4)
 
 
 def _told_images(sizes: list[int]) -> list[str]:
@@ -237,6 +241,7 @@ class DeviceRenderer:
         self._paths = load("RENDER_PATHS", self._scene.settings.precision)
         self._stages = SceneKernels(facts, blocks, self._scene)
         self._walks = load("RENDER_WALKS", self._scene.settings.precision) if facts["subsurface"] else None
+        self._media = facts["media"] and self._stages.plan["VOLUMES"]
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
         self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]))
@@ -270,13 +275,13 @@ class DeviceRenderer:
         free, _ = cp.cuda.runtime.memGetInfo()
         fields, root = core.render.task_fields(), self._arrays.root
         stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
-        walks = self._walks is not None
-        fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels, walks))
+        walks, media = self._walks is not None, self._media
+        fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels, walks, media))
         samples = max(1, self._scene.settings.samples)
         paths = min(MOST_PATHS, fits, pixels * samples)
         while paths >= min(FEWEST_PATHS, pixels):
             try:
-                return Memory(root, pixels, materials, paths, walks)
+                return Memory(root, pixels, materials, paths, walks, media)
             except cp.cuda.memory.OutOfMemoryError:
                 cp.get_default_memory_pool().free_all_blocks()
                 paths //= 2
@@ -322,6 +327,8 @@ class DeviceRenderer:
         self._merged = False
         self._counts["paths"] += rays
         self._launch(self._paths.kernel("begin_paths"), 0, rays, struct.pack("<4I", pixel, pixels, sample, samples))
+        if self._media:
+            self._launch(self._stages.kernel("enter_media"), 0, rays, self._tracer.root)
         turn = 0
         while rays:
             shadows = self._trace_round(turn, rays)
@@ -337,6 +344,8 @@ class DeviceRenderer:
         own_rays = memory.address(f"{following}rays")
         kinds = memory.address("next_kind" if turn else "ray_kind")
         self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"), memory.counter("traced"))
+        if self._media:
+            self._launch(stages.kernel("cross_media"), turn, rays)
         self._launch(stages.kernel("find_light"), turn, rays)
         self._launch(paths.kernel("count_materials"), turn, rays)
         self._launch(paths.kernel("place_materials"), turn, 1)

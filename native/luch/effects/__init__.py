@@ -21,6 +21,7 @@ from luch.effects.removal import without
 from luch.effects.shown import look_at
 from luch.effects.surfaces import add_surfaces, add_textures
 from luch.effects.table import Effect, Effects, summary
+from luch.effects.volumes import add_volumes
 from luch.scene import Scene
 
 __all__ = ["Effect", "Effects", "effects_of", "summary"]
@@ -55,6 +56,7 @@ def _found(scene: Scene) -> Effects:
     add_lights(effects, shown)
     add_camera(effects, shown)
     add_geometry(effects, shown)
+    add_volumes(effects, shown)
     add_paths(effects, shown)
     add_film(effects, shown)
     add_later(effects, shown)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from luch.effects.shown import Shown
 from luch.effects.surfaces import facts
 from luch.effects.table import Effects
+from luch.effects.volumes import add_volume_bounces
 from luch.scene import Film, Mesh
 
 _SUM_BYTES = 8  # a number of the film is a double
@@ -14,6 +15,7 @@ PASSES = {
     "Diffuse Direct": 3, "Diffuse Indirect": 3, "Diffuse Color": 3,
     "Glossy Direct": 3, "Glossy Indirect": 3, "Glossy Color": 3,
     "Transmission Direct": 3, "Transmission Indirect": 3, "Transmission Color": 3,
+    "Volume Direct": 3, "Volume Indirect": 3,
     "Emission": 3, "Environment": 3, "Ambient Occlusion": 3, "Denoising Albedo": 3, "Denoising Normal": 3,
     "Sample Count": 0,
     "Error": 0,  # from what the estimate of the error keeps
@@ -25,7 +27,7 @@ _LATER = (
     ("motion blur", "Camera", "the scene asks for no motion blur"),
     ("stereoscopy", "Camera", "the scene is not stereoscopic"),
     ("hair", "Geometry", "the scene has none"),
-    ("volumes", "Geometry", "no object, material or world has a volume"),
+    ("heterogeneous volumes", "Geometry", "no volume changes from place to place"),
     ("displacement", "Geometry", "no material displaces its surface"),
     ("light linking", "Light", "no object uses it"),
 )
@@ -97,6 +99,7 @@ def add_paths(effects: Effects, shown: Shown) -> None:
             settings.transmission_bounces,
         ),
     ]
+    most.append(add_volume_bounces(effects, shown))
     _add_bounces(effects, shown, "transparent", ("transparency",), settings.transparent_bounces)
     reach = min(settings.max_bounces, sum(most))
     if reach:

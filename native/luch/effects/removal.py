@@ -113,6 +113,11 @@ def _no_world(scene: Scene) -> Scene:
     return replace(scene, world=None)
 
 
+def _no_volumes(scene: Scene) -> Scene:
+    materials = [replace(material, volume=None) for material in scene.materials]
+    return replace(scene, materials=materials, world=scene.world and replace(scene.world, volume=None))
+
+
 def _unsampled_world(scene: Scene) -> Scene:
     return replace(scene, world=scene.world and replace(scene.world, sampling="NONE"))
 
@@ -132,7 +137,7 @@ _NOT_STORED = "the pass is not there"
 _PASSES = (
     "Depth", "Mist", "Position", "Normal", "UV", "Object Index", "Material Index", "Diffuse Direct",
     "Diffuse Indirect", "Diffuse Color", "Glossy Direct", "Glossy Indirect", "Glossy Color", "Transmission Direct",
-    "Transmission Indirect", "Transmission Color", "Emission", "Environment", "Ambient Occlusion", "Denoising Albedo",
+    "Transmission Indirect", "Transmission Color", "Volume Direct", "Volume Indirect", "Emission", "Environment", "Ambient Occlusion", "Denoising Albedo",
     "Denoising Normal", "Sample Count", "Error",
 )  # fmt: skip
 
@@ -193,6 +198,8 @@ REMOVALS: dict[str, Removal] = {
     "point clouds": Removal(
         "nothing", lambda scene: replace(scene, meshes=[replace(mesh, spheres=None) for mesh in scene.meshes])
     ),
+    "volumes": Removal("empty space", _no_volumes),
+    "volume bounces": Removal("light scatters once", _settings(volume_bounces=0)),
     "indirect light": Removal("direct light alone", _settings(max_bounces=0)),
     "diffuse bounces": Removal("paths end there", _settings(diffuse_bounces=0)),
     "glossy bounces": Removal("paths end there", _settings(glossy_bounces=0)),

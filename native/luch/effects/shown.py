@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from luch.effects.programs import Reading, read_program
-from luch.scene import Mesh, Scene
+from luch.scene import Medium, Mesh, Scene
 
 SHADOW = 32  # RayKind bit of shadow rays, as in Object.visibility
 _BLOCK = 1 << 20  # slots that are counted at a time: counting widens them to 8 bytes each
@@ -26,6 +26,7 @@ class Surface:
     triangles: int = 0  # that show it, over all instances
     spheres: int = 0
     blocks_light: bool = False  # some object with it is seen by shadow rays
+    volume: Medium | None = None  # behind it
 
     @property
     def title(self) -> str:
@@ -55,6 +56,7 @@ def look_at(scene: Scene) -> Shown:
             _traits(reading),
             material.transparent_shadows,
             material.emission_sampling != "NONE",
+            volume=material.volume,
         )
         for material in scene.materials
     ]

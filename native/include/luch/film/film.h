@@ -25,6 +25,7 @@ struct FilmLayout {
     u32 diffuse_direct, diffuse_indirect, diffuse_color;
     u32 glossy_direct, glossy_indirect, glossy_color;
     u32 transmission_direct, transmission_indirect, transmission_color;
+    u32 volume_direct, volume_indirect;
     u32 denoising_albedo, denoising_normal, denoising_depth;
     u32 lightgroups;  // 3 per light group
     u32 aovs;         // 4 per AOV, a value in the first

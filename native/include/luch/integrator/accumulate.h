@@ -19,6 +19,7 @@ struct ShadowRay {
     float footprint;
     bool for_ao;
     bool casts;      // false: the lamp casts no shadow, the ray counts as free
+    bool volume_pass;  // belongs to the light passes of volumes
 };
 
 // Limits a contribution; false (and counted) when it is not finite: such light never enters.
@@ -31,9 +32,13 @@ LUCH_FN bool admit(const RenderView& scene, FilmWriter& writer, Color& c, u32 bo
     return true;
 }
 
-LUCH_FN_SLOW void add_to_light_passes(FilmWriter& writer, u32 pixel, Color c, Color diffuse, Color glossy,
+LUCH_FN_SLOW void add_to_light_passes(FilmWriter& writer, u32 pixel, Color c, Color diffuse, Color glossy, bool volume,
                                       bool direct) {
     const FilmLayout& layout = writer.film.layout;
+    if (plan::VOLUMES && volume) {
+        film_add(writer, pixel, direct ? layout.volume_direct : layout.volume_indirect, c);
+        return;
+    }
     Color rest = make_vec3(1.0f) - diffuse - glossy;
     film_add(writer, pixel, direct ? layout.diffuse_direct : layout.diffuse_indirect, c * diffuse);
     film_add(writer, pixel, direct ? layout.glossy_direct : layout.glossy_indirect, c * glossy);
@@ -56,7 +61,8 @@ LUCH_FN void add_emission(const RenderView& scene, FilmWriter& writer, const Pat
     if (!(path.flags & PATH_PASS_CHOSEN)) {
         film_add(writer, path.pixel, own_pass, c);
     } else {
-        add_to_light_passes(writer, path.pixel, c, path.pass_diffuse, path.pass_glossy, path.bounce == 1);
+        add_to_light_passes(writer, path.pixel, c, path.pass_diffuse, path.pass_glossy, path.flags & PATH_VOLUME_PASS,
+                            path.bounce == 1);
     }
 }
 
@@ -77,7 +83,8 @@ LUCH_FN void add_direct(const RenderView& scene, FilmWriter& writer, const PathS
     film_add_combined(writer, path.pixel, c);
     if (!wants_light_passes(writer.film.layout)) return;
     if (shadow.lightgroup) film_add_lightgroup(writer, path.pixel, shadow.lightgroup - 1, c);
-    add_to_light_passes(writer, path.pixel, c, shadow.pass_diffuse, shadow.pass_glossy, shadow.bounce == 0);
+    add_to_light_passes(writer, path.pixel, c, shadow.pass_diffuse, shadow.pass_glossy, shadow.volume_pass,
+                        shadow.bounce == 0);
 }
 
 // Light that goes on to a transparent background or into a holdout: 1 - alpha.

@@ -124,6 +124,7 @@ LUCH_FN bool make_shadow_ray(const FilmLayout& layout, const PathState& path, u3
     shadow->lightgroup = s.lightgroup;
     shadow->for_ao = false;
     shadow->casts = s.cast_shadow;
+    shadow->volume_pass = path.flags & PATH_VOLUME_PASS;
     return true;
 }
 
@@ -150,17 +151,42 @@ LUCH_FN bool wants_ao(const FilmLayout& layout, const PathState& path) {
     return plan::AMBIENT_OCCLUSION && layout.ambient_occlusion != NONE && (path.flags & PATH_CAMERA);
 }
 
+// The ray goes on from another point on its way, to the same end.
+LUCH_FN void start_again(Ray* ray, Vec3 origin) {
+    if (finite_f(ray->t_max)) ray->t_max -= dot(origin - ray->origin, ray->direction);
+    ray->origin = origin;
+}
+
+// Takes the ray straight through a surface, out of and into media.
+LUCH_FN void pass_surface(const SceneView& scene, MediumStack& stack, const Hit& hit, Ray* ray) {
+    SurfacePoint spot = surface_point(scene, hit, *ray);
+    Vec3 ng = border_normal(scene, hit, spot);
+    cross_border(scene, stack, hit.instance, hit.prim, dot(ng, ray->direction) > 0.0f);
+    start_again(ray, offset_origin(spot, ng, ray->direction));
+}
+
 // A shadow ray that met only surfaces that may be transparent: from one to the next, until it is dark.
 // tracer.closest(ray) gives a Hit; shader.light(program, points, lane) a point's ClosureSet of light alone.
-// *steps: surfaces looked through; *rays: traced.
+// *steps: surfaces looked through; *rays: traced. stack: media around the ray's beginning, which become those at its end;
+// null: the scene has none.
 template <class Tracer, class Shader>
-LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const ShadowRay& shadow, Tracer& tracer,
-                               Shader& shader, ShadePoints& points, u64* steps, u64* rays) {
+LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const ShadowRay& shadow, MediumStack* stack,
+                               Tracer& tracer, Shader& shader, ShadePoints& points, u64* steps, u64* rays) {
     Color through = make_vec3(1.0f);
     Ray ray = first;
     for (u32 passed = shadow.transparent_depth; passed <= scene.limits.transparent; passed++) {
         Hit hit = tracer.closest(ray);
         ++*rays;
+        if (plan::VOLUMES && stack) {
+            through *= media_transmittance(scene.media, *stack, min_f(hit.t, ray.t_max));
+            if (is_zero(through)) return through;
+            if (hit.instance != NONE && is_border(scene.view, hit)) {
+                pass_surface(scene.view, *stack, hit, &ray);
+                passed--;  // no surface: it counts as none
+                if (!(ray.t_max > 0.0f)) return through;
+                continue;
+            }
+        }
         if (hit.instance == NONE) return through;
         if (passed == scene.limits.transparent) return make_vec3(0.0f);
         const MaterialView& material = scene.view.materials[material_at(scene.view, hit.instance, hit.prim)];
@@ -182,9 +208,9 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const 
         setup_surface_lane(scene.view, in, points, 0);
         through *= shader.light(material.program, points).transparent;
         if (!(max_component(through) > 0.0f)) return make_vec3(0.0f);
-        Vec3 origin = offset_origin(spot, lane_face_normal(points, 0), ray.direction);
-        if (finite_f(ray.t_max)) ray.t_max -= dot(origin - ray.origin, ray.direction);
-        ray.origin = origin;
+        if (plan::VOLUMES && stack)
+            cross_border(scene.view, *stack, hit.instance, hit.prim, points.flags[0] & PATH_BACKFACING);
+        start_again(&ray, offset_origin(spot, lane_face_normal(points, 0), ray.direction));
         if (!(ray.t_max > 0.0f)) return through;
     }
     return make_vec3(0.0f);

@@ -30,26 +30,28 @@ LUCH_FN Color eval_lamp(const RenderView& scene, const PathState& path, const La
 
 template <class Shader>
 LUCH_FN void add_lamp(const RenderView& scene, FilmWriter& writer, const PathState& path, const LampHit& hit,
-                      const Ray& ray, Shader& shader, ShadePoints& points) {
+                      const Ray& ray, const MediumStack* stack, Shader& shader, ShadePoints& points) {
     float pdf = 0.0f;
     if (!(path.flags & PATH_NO_MIS)) {
         pdf =
             pdf_lamp(scene.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, hit, ray.direction);
     }
     Color light = eval_lamp(scene, path, hit, ray, shader, points) * hit.radiance;
+    if (plan::VOLUMES && stack) light *= media_transmittance(scene.media, *stack, hit.t);
     add_emission(scene, writer, path, light * mis_weight(path.mis_pdf, pdf), writer.film.layout.emission,
                  scene.view.lights->lamps[hit.lamp].lightgroup);
 }
 
-// Lamps do not stop rays: every lamp in front of the surface (at surface_t) adds its light.
+// Lamps do not stop rays: every lamp in front of the surface (at surface_t) adds its light. stack: media around the ray,
+// or null.
 template <class Shader>
 LUCH_FN void find_lamps(const RenderView& scene, FilmWriter& writer, const PathState& path, Ray ray, float surface_t,
-                        Shader& shader, ShadePoints& points) {
+                        const MediumStack* stack, Shader& shader, ShadePoints& points) {
     ray.t_max = min_f(surface_t, ray.t_max);
     for (u32 passed = 0; passed < scene.limits.transparent + 1; passed++) {
         LampHit lamp = closest_lamp(scene.view, ray, path.visibility);
         if (lamp.lamp == NONE) break;
-        add_lamp(scene, writer, path, lamp, ray, shader, points);
+        add_lamp(scene, writer, path, lamp, ray, stack, shader, points);
         // Past this lamp: the next float after its distance.
         ray.t_min = bits_float(float_bits(max_f(lamp.t, 1e-30f)) + 1u);
         if (!(ray.t_min < ray.t_max)) break;
@@ -63,7 +65,7 @@ LUCH_FN bool leave_scene(const RenderView& scene, FilmWriter& writer, const Path
     // Suns with an angle.
     for (u32 sun = 0; plan::SUNS && sun < scene.view.lights->sun_count; sun++) {
         LampHit hit = sun_hit(scene.view, sun, ray.direction, path.visibility);
-        if (hit.lamp != NONE) add_lamp(scene, writer, path, hit, ray, shader, points);
+        if (hit.lamp != NONE) add_lamp(scene, writer, path, hit, ray, nullptr, shader, points);
     }
     bool data_open = (path.flags & PATH_THROUGH_FILM) && !(path.flags & PATH_DATA_DONE);
     if (data_open && path.sample == 0) film_set_background(writer, path.pixel);

@@ -21,6 +21,7 @@ enum PathMemory : u32 {
     PATH_DATA_DONE = 1u << 22,               // depth, normal and indices are written
     PATH_FEATURES = 1u << 23,                // denoising features are still to be written
     PATH_MIS_TRANSMITS = 1u << 24,           // the surface left last could be lit from behind
+    PATH_VOLUME_PASS = 1u << 25,             // the bounce that chose its light pass was in a volume
 };
 
 struct PathState {
@@ -39,13 +40,13 @@ struct PathState {
     u32 sample;               // of its pixel in this render, 0 the first
     u32 pixel;
     u16 bounce, transparent_bounce;
-    u8 diffuse_bounce, glossy_bounce, transmission_bounce;
+    u8 diffuse_bounce, glossy_bounce, transmission_bounce, volume_bounce;
     Color pass_diffuse, pass_glossy;  // shares of the first bounce in the light passes; the rest is transmission
     Color feature_throughput;
 };
 
 struct PathLimits {
-    u32 bounces, diffuse, glossy, transmission, transparent;
+    u32 bounces, diffuse, glossy, transmission, volume, transparent;
     u32 min_bounces, min_transparent;
     float clamp_direct, clamp_indirect;  // 0: off
     float filter_glossy;                 // 0: off
@@ -96,8 +97,9 @@ LUCH_FN u32 next_visibility(LobeClass lobe_class, bool transmitted) {
 LUCH_FN void count_bounce(PathState& path, const PathLimits& limits, const BsdfSample& s, bool transmits,
                           bool see_through) {
     u32 flags =
-        path.flags & ~(u32(PATH_CAMERA | PATH_DIFFUSE | PATH_GLOSSY | PATH_SINGULAR | PATH_REFLECT | PATH_TRANSMIT) |
-                       u32(PATH_NO_MIS | PATH_BEHIND_TRANSPARENT | PATH_MIS_TRANSMITS));
+        path.flags &
+        ~(u32(PATH_CAMERA | PATH_DIFFUSE | PATH_GLOSSY | PATH_SINGULAR | PATH_REFLECT | PATH_TRANSMIT | PATH_VOLUME) |
+          u32(PATH_NO_MIS | PATH_BEHIND_TRANSPARENT | PATH_MIS_TRANSMITS));
     path.bounce++;
     bool last = path.bounce >= limits.bounces;
     if (s.transmitted) {

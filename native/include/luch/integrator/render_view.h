@@ -4,6 +4,7 @@
 #include "luch/camera/camera.h"
 #include "luch/film/film.h"
 #include "luch/film/filter.h"
+#include "luch/integrator/medium.h"
 #include "luch/integrator/path.h"
 #include "luch/light/light.h"
 
@@ -35,6 +36,8 @@ struct RenderView {
     bool can_meet_light;      // a ray may come upon an emitter, a lamp or the world by itself
     u32 world_visibility, world_lightgroup;
     ConstantEmission world_emission;
+    bool has_media;           // some volume or the world holds a medium: paths have lists of them
+    MediaView media;
     float mist_start, mist_inverse_depth, mist_exponent;
 };
 

@@ -1,7 +1,7 @@
 // The paths of a device under way at once, as structures of arrays, and the queues between its stages. Plain data:
 // filled by the host (bindings/render.cpp makes it, luch/cuda/render.py sets the device's pointers), read by kernels.
 #pragma once
-#include "luch/integrator/direct_light.h"
+#include "luch/integrator/volume.h"
 
 namespace luch {
 
@@ -28,6 +28,7 @@ enum WaveTotal : u32 {
     TOTAL_LIGHT_POINTS,
     TOTAL_WALKS,
     TOTAL_WALK_STEPS,
+    TOTAL_FLIGHTS,
     TOTALS
 };
 
@@ -60,6 +61,8 @@ struct Wavefront {
     u32* shadow_kind;          // RAY_SHADOW, all of them
     u8* blocked;
     SubsurfaceWalk* walks;     // that begin in this round; null: nothing scatters under its surface
+    MediumStack* media;        // by slot: around its ray; null: the scene has none
+    MediumStack* shadow_media; // by shadow ray: around its beginning
     float* aovs;               // 4 floats for each of the film's AOVs, per entry of sorted; null: none
     u32* counters;             // WaveCounter
     u64* totals;               // WaveTotal

@@ -59,6 +59,8 @@ struct MaterialView {
     float crypto;
     u32 emission_sampling;  // 0 none, 1 front, 2 back, 3 both
     u32 transparent_shadows;
+    u32 medium;             // what fills the space behind it; NONE: nothing
+    u32 only_volume;        // 1: there is no surface, only the border of its medium
 };
 
 enum class PixelFormat : u8 { U8, F16, F32 };
