@@ -96,6 +96,8 @@ class PyRenderer {
         d["shadow_rays"] = s.counts.shadow_rays;
         d["surface_points"] = s.counts.surface_points;
         d["non_finite_samples"] = s.counts.bad_samples;
+        d["clamped_units"] = s.counts.clamped;
+        d["cut_units"] = s.counts.cut;
         d["accelerator"] = s.accel_name;
         d["accelerator_reason"] = s.accel_reason;
         d["triangles"] = s.accel.triangles;

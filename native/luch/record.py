@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from luch import ledger
 from luch.accuracy import percent
 from luch.curve import describe
 from luch.effects import summary
@@ -28,6 +29,7 @@ def line(stats: Mapping[str, Any]) -> str:
         text += f", {describe(stats)}"
     if stats.get("stopped_by") in ENDS:
         text += f"; {ENDS[stats['stopped_by']]}"
+    text += "".join(f"; {taken[0].lower()}{taken[1:]}" for taken in ledger.lines(stats))
     if "verified" in stats:
         text += f"; {verdict(stats['verified'])}"
     return text

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from luch import accuracy
+from luch import accuracy, ledger
 from luch._native import core
 from luch.curve import Curve, Forecast, next_target
 from luch.effects import effects_of
@@ -286,6 +286,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         effects=effects,
     )
     passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
+    stats.update(ledger.shares(stats, passes["Combined"], scene.film.exposure))
     stats.update(loop.curve.statistics())
     if wants_error:
         passes[ERROR_PASS] = error_pass(renderer.deviations()[1])

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from luch import merge
+from luch import ledger, merge
 from luch.accuracy import NORMAL_95
 from luch.render import ERROR_PASS, Progress, Result, error_pass, render
 from luch.scene import Scene
@@ -51,10 +51,22 @@ def _merged(scene: Scene, halves: list[Result]) -> Result:
     if ERROR_PASS in scene.film.passes:
         passes[ERROR_PASS] = error_pass(film.deviations()[1])
     stats = dict(halves[0].stats)
-    for key in ("paths", "rays", "shadow_rays", "samples", "render_seconds", "prepare_seconds", "total_seconds"):
+    for key in (
+        "paths",
+        "rays",
+        "shadow_rays",
+        "clamped_units",
+        "cut_units",
+        "non_finite_samples",
+        "samples",
+        "render_seconds",
+        "prepare_seconds",
+        "total_seconds",
+    ):
         stats[key] = sum(half.stats[key] for half in halves)
     for key in [key for key in stats if key.startswith(("error_curve", "next_error", "seconds_to"))]:
         del stats[key]
+    stats.update(ledger.shares(stats, passes["Combined"], scene.film.exposure))
     stats["samples_asked"] = scene.settings.samples
     found = sums.estimate()
     if found is not None and all("error" in half.stats for half in halves):

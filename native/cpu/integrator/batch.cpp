@@ -44,6 +44,8 @@ void BatchCounts::add(const BatchCounts& other) {
     shadow_rays += other.shadow_rays;
     surface_points += other.surface_points;
     bad_samples += other.bad_samples;
+    clamped += other.clamped;
+    cut += other.cut;
     lens_samples += other.lens_samples;
     lamp_searches += other.lamp_searches;
     transparent_steps += other.transparent_steps;
@@ -57,6 +59,8 @@ void BatchCounts::add(const BatchCounts& other) {
 BatchCounts Batch::counts() const {
     BatchCounts counts = counts_;
     counts.bad_samples += writer_.rejected;
+    counts.clamped += writer_.clamped;
+    counts.cut += writer_.cut;
     return counts;
 }
 
@@ -198,7 +202,7 @@ void Batch::shade_hits() {
         int count = 0;
         for (u32 i = begin; i < end; i++) {
             u32 k = sorted_[i];
-            if (!survives(scene_, paths_[ray_path_[k]], scene_.view.materials[m])) continue;
+            if (!survives(scene_, writer_, paths_[ray_path_[k]], scene_.view.materials[m])) continue;
             chunk[count++] = k;
             if (count == SHADE_LANES) {
                 shade_chunk(m, chunk, count);

@@ -20,6 +20,7 @@ inline constexpr int CAMERA_LANES = 16;
 
 struct BatchCounts {
     u64 paths = 0, rays = 0, shadow_rays = 0, surface_points = 0, bad_samples = 0;
+    u64 clamped = 0, cut = 0;   // as FilmWriter has them
     u64 lens_samples = 0;       // camera rays that chose a point of the aperture
     u64 lamp_searches = 0;      // rays that looked for lamps on their way
     u64 transparent_steps = 0;  // surfaces that shadow rays looked through, one by one

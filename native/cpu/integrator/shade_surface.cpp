@@ -40,8 +40,8 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
         }
         if (scene_.has_subsurface && enters_subsurface(k, lane, set, spawn, {u[0][i], u[1][i], u[2][i]})) continue;
         next_path_[next_count_] = path_index;
-        if (scatter(scene_, writer_.film.layout, path, points, lane, set, spawn, {u[0][i], u[1][i], u[2][i]},
-                    rays_[k].direction, hits_[k].t, &next_rays_[next_count_], &writer_.rejected))
+        if (scatter(scene_, writer_, path, points, lane, set, spawn, {u[0][i], u[1][i], u[2][i]}, rays_[k].direction,
+                    hits_[k].t, &next_rays_[next_count_]))
             send_next(points, lane);
     }
 }

@@ -80,9 +80,9 @@ void Batch::shade_exits(u32 material_index, const u32* queue, int count) {
     for (int lane = 0; lane < count; lane++) {
         u32 path = ray_path_[rays[lane]];
         next_path_[next_count_] = path;
-        if (scatter(scene_, writer_.film.layout, paths_[path], points, lane, sets[lane], scratch_->spawn[lane],
+        if (scatter(scene_, writer_, paths_[path], points, lane, sets[lane], scratch_->spawn[lane],
                     {u[0][lane], u[1][lane], u[2][lane]}, -walks_[queue[lane]].direction, 0.0f,
-                    &next_rays_[next_count_], &writer_.rejected))
+                    &next_rays_[next_count_]))
             send_next(points, lane);
     }
 }

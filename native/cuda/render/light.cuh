@@ -31,5 +31,5 @@ LUCH_STAGE(find_light) {
         }
         add_world(task.scene, writer, path, ray.direction, radiance);
     }
-    add_total(wave, TOTAL_REJECTED, writer.rejected);
+    add_totals(wave, writer);
 }

@@ -47,7 +47,7 @@ LUCH_STAGE(cross_media) {
         store_path(wave, slot, path);
         add_total(wave, TOTAL_FLIGHTS, 1);
     }
-    add_total(wave, TOTAL_REJECTED, writer.rejected);
+    add_totals(wave, writer);
 }
 
 #endif

@@ -54,10 +54,10 @@ __device__ __noinline__ void send_on(const RenderTask& task, PathState& path, u3
     const Wavefront& wave = task.wave;
     Ray next;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
-    u64 rejected = 0;
+    FilmWriter writer{task.film, 0};
     bool goes_on =
-        scatter(task.scene, task.film.layout, path, points, 0, set, spawn, u, direction, distance, &next, &rejected);
-    add_total(wave, TOTAL_REJECTED, rejected);
+        scatter(task.scene, writer, path, points, 0, set, spawn, u, direction, distance, &next);
+    add_totals(wave, writer);
     if (!goes_on) return;
     if (plan::VOLUMES && wave.media) wave.media[slot] = beyond(task, slot, points, next.direction);
     push_ray(wave, next, slot, path.visibility);

@@ -47,5 +47,5 @@ extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK, LUCH_STAGE_BLOCK
     if (is_zero(through)) return;
     FilmWriter writer = film_of_slot(task, shadow.path);
     add_direct(task.scene, writer, path, shadow, through);
-    add_total(wave, TOTAL_REJECTED, writer.rejected);
+    add_totals(wave, writer);
 }

@@ -18,6 +18,13 @@ __device__ __forceinline__ void add_total(const Wavefront& wave, WaveTotal total
     if (amount != 0) atomicAdd(wave.totals + total, amount);
 }
 
+// What a writer has counted.
+__device__ __forceinline__ void add_totals(const Wavefront& wave, const FilmWriter& writer) {
+    add_total(wave, TOTAL_REJECTED, writer.rejected);
+    add_total(wave, TOTAL_CLAMPED, writer.clamped);
+    add_total(wave, TOTAL_CUT, writer.cut);
+}
+
 // media: around the ray's beginning; null without any.
 __device__ __forceinline__ void push_shadow(const Wavefront& wave, const Ray& ray, const ShadowRay& shadow,
                                             const MediumStack* media) {

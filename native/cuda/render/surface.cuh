@@ -29,8 +29,11 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
         pass_border(task, path, slot, hit, ray);
         return false;
     }
-    if (!survives(scene, path, material)) return false;
     FilmWriter writer = film_of_slot(task, slot);
+    if (!survives(scene, writer, path, material)) {
+        add_totals(wave, writer);
+        return false;
+    }
     ShadePoints points;
     ClosureSet set;
     points.count = 1;
@@ -52,7 +55,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
         if (!inside) send_on(task, path, slot, points, set, spawn, ray.direction, hit.t);
         store_path(wave, slot, path);
     }
-    add_total(wave, TOTAL_REJECTED, writer.rejected);
+    add_totals(wave, writer);
     return true;
 }
 

@@ -38,7 +38,7 @@ MARK_CHANNELS = 4  # of luch/film/film.h
 RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
 COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed", "walks", "walked")  # WaveCounter
 TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
-          "light_points", "subsurface_walks", "subsurface_steps", "flights")  # WaveTotal  # fmt: skip
+          "light_points", "subsurface_walks", "subsurface_steps", "flights", "clamped_units", "cut_units")  # WaveTotal  # fmt: skip
 
 
 class Memory:

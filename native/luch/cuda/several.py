@@ -18,7 +18,7 @@ from luch.cuda.render import DeviceRenderer, HostScene, parted
 from luch.cuda.trace import TreesTooDeep
 
 # Counts and seconds that are added up; of other statistics the first device's stand for all.
-SUMMED = ("paths", "rays", "shadow_rays", "surface_points", "non_finite_samples", "transparent_steps", "world_points",
+SUMMED = ("paths", "rays", "shadow_rays", "surface_points", "non_finite_samples", "clamped_units", "cut_units", "transparent_steps", "world_points",
           "light_points", "device_scene_bytes", "device_film_and_paths_bytes", "paths_at_once", "subsurface_walks", "subsurface_steps")  # fmt: skip
 
 

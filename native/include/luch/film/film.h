@@ -49,7 +49,13 @@ struct FilmView {
 struct FilmWriter {
     FilmView film;
     u64 rejected;
+    // What settings took, in fixed point: sums that no order of threads changes.
+    u64 clamped = 0;  // light that a limit cut off Combined; CLAMPED_UNIT
+    u64 cut = 0;      // throughput of paths that a limit of bounces ended at a surface; CUT_UNIT
 };
+inline constexpr float CLAMPED_UNIT = 1.0f / 65536.0f, CUT_UNIT = 1.0f / 1048576.0f;
+// The brightest sample that is counted in full: a thousand million of them fit.
+inline constexpr float MOST_CLAMPED = 250000.0f;
 
 // x - x is 0 for finite values and NaN for the others; one test for a whole colour.
 LUCH_FN bool all_finite(Color c) { return (c.x - c.x) + (c.y - c.y) + (c.z - c.z) == 0.0f; }

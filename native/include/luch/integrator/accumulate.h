@@ -32,6 +32,19 @@ LUCH_FN bool admit(const RenderView& scene, FilmWriter& writer, Color& c, u32 bo
     return true;
 }
 
+// Notes what admit() took of a contribution to Combined.
+LUCH_FN void note_clamped(FilmWriter& writer, Color before, Color after) {
+    if (!plan::CLAMPING) return;
+    float taken = average(before - after);
+    if (taken > 0.0f) writer.clamped += u64(min_f(taken, MOST_CLAMPED) / CLAMPED_UNIT);
+}
+
+// A path that a limit of bounces ends at a surface: what lies beyond counts by so much, at most.
+LUCH_FN void note_cut(FilmWriter& writer, const PathState& path, float opaque) {
+    float weight = average(path.throughput) * opaque;
+    if (weight > 0.0f && weight < MOST_CLAMPED) writer.cut += u64(weight / CUT_UNIT);
+}
+
 LUCH_FN_SLOW void add_to_light_passes(FilmWriter& writer, u32 pixel, Color c, Color diffuse, Color glossy, bool volume,
                                       bool direct) {
     const FilmLayout& layout = writer.film.layout;
@@ -50,7 +63,9 @@ LUCH_FN_SLOW void add_to_light_passes(FilmWriter& writer, u32 pixel, Color c, Co
 LUCH_FN void add_emission(const RenderView& scene, FilmWriter& writer, const PathState& path, Color radiance,
                           u32 own_pass, u32 lightgroup) {
     Color c = path.throughput * radiance;
+    const Color whole = c;
     if (is_zero(c) || !admit(scene, writer, c, path.bounce > 1 ? 1 : 0)) return;
+    note_clamped(writer, whole, c);
     film_add_combined(writer, path.pixel, c);
     const FilmLayout& layout = writer.film.layout;
     if (!wants_light_passes(layout) && !gathers_features(path)) return;
@@ -75,11 +90,13 @@ LUCH_FN void add_environment_only(const RenderView& scene, FilmWriter& writer, c
 LUCH_FN void add_direct(const RenderView& scene, FilmWriter& writer, const PathState& path, const ShadowRay& shadow,
                         Color transmittance) {
     Color c = shadow.contribution * transmittance;
+    const Color whole = c;
     if (!admit(scene, writer, c, shadow.bounce)) return;
     if (plan::AMBIENT_OCCLUSION && shadow.for_ao) {
         film_add(writer, path.pixel, writer.film.layout.ambient_occlusion, c);
         return;
     }
+    note_clamped(writer, whole, c);
     film_add_combined(writer, path.pixel, c);
     if (!wants_light_passes(writer.film.layout)) return;
     if (shadow.lightgroup) film_add_lightgroup(writer, path.pixel, shadow.lightgroup - 1, c);

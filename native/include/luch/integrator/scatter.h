@@ -8,12 +8,15 @@
 namespace luch {
 
 // Decides Russian roulette before shading: a path that ends on a surface without emission is dropped unseen.
-LUCH_FN bool survives(const RenderView& scene, PathState& path, const MaterialView& material) {
+LUCH_FN bool survives(const RenderView& scene, FilmWriter& writer, PathState& path, const MaterialView& material) {
     path.continuation = continuation_probability(path, scene.limits);
     bool emits = material.program.flags & PROGRAM_EMISSION;
     if (path.flags & PATH_ENDS_AT_SURFACE) return emits;
     bool lets_through = material.program.flags & PROGRAM_TRANSPARENT;
-    if (!emits && !lets_through && looks_for_light_alone(path)) return false;
+    if (!emits && !lets_through && looks_for_light_alone(path)) {
+        note_cut(writer, path, 1.0f);
+        return false;
+    }
     if (path.continuation == 1.0f) return true;
     float u = sample_1d(path.sampler, path.dimension + DIM_TERMINATE);
     if (path.continuation > 0.0f && u < path.continuation) return true;
@@ -87,7 +90,10 @@ LUCH_FN bool meet_surface(const RenderView& scene, FilmWriter& writer, PathState
     if (aovs) write_aovs(writer, path, aovs);
     if (wants_data_passes(writer.film.layout)) write_data_passes(scene, writer, path, points, lane, set, material);
     if (gathers_features(path)) write_features(scene, writer, path, set, lane_to_viewer(points, lane));
-    if (path.flags & PATH_LAST_BOUNCE) set.count = 0;  // only straight-through light goes on
+    if (path.flags & PATH_LAST_BOUNCE) {  // only straight-through light goes on
+        if (set.count > 0) note_cut(writer, path, 1.0f - average(set.transparent));
+        set.count = 0;
+    }
     return true;
 }
 
@@ -118,11 +124,10 @@ LUCH_FN Ray ray_from(const SurfacePoint& spawn, Vec3 ng, Vec3 direction) {
 }
 
 // Chooses where the path goes on; false when it ends. u: two numbers for the direction, one for the choice of lobe;
-// incoming: direction and hit distance of the ray that came here. The next ray goes to *next;
-// *rejected counts what is not finite.
-LUCH_FN bool scatter(const RenderView& scene, const FilmLayout& layout, PathState& path, const ShadePoints& points,
-                     int lane, const ClosureSet& set, const SurfacePoint& spawn, Vec3 u, Vec3 incoming, float distance,
-                     Ray* next, u64* rejected) {
+// incoming: direction and hit distance of the ray that came here. The next ray goes to *next.
+LUCH_FN bool scatter(const RenderView& scene, FilmWriter& writer, PathState& path, const ShadePoints& points, int lane,
+                     const ClosureSet& set, const SurfacePoint& spawn, Vec3 u, Vec3 incoming, float distance,
+                     Ray* next) {
     float through = average(set.transparent), lobes = lobe_weight_sum(set);
     if (!(through + lobes > 0.0f)) return false;
     Vec3 ng = lane_face_normal(points, lane);
@@ -140,10 +145,10 @@ LUCH_FN bool scatter(const RenderView& scene, const FilmLayout& layout, PathStat
     BsdfSample s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
     if (!(s.pdf_sa > 0.0f) || is_zero(s.throughput)) return false;
     if (!finite_v(s.throughput)) {
-        ++*rejected;
+        ++writer.rejected;
         return false;
     }
-    if (!(path.flags & PATH_PASS_CHOSEN)) choose_passes(layout, path, s);
+    if (!(path.flags & PATH_PASS_CHOSEN)) choose_passes(writer.film.layout, path, s);
     float lobe_probability = 1.0f - through_probability;
     path.throughput *= s.throughput * (1.0f / lobe_probability);
     path.mis_pdf = s.pdf_sa * lobe_probability;
@@ -155,7 +160,10 @@ LUCH_FN bool scatter(const RenderView& scene, const FilmLayout& layout, PathStat
     bool see_through = s.transmitted && scene.limits.film_transparent_glass && scene.limits.film_transparent &&
                        s.roughness <= sqr(scene.limits.film_transparent_roughness);
     count_bounce(path, scene.limits, s, set_transmits(set), see_through);
-    if (looks_for_light_alone(path) && !scene.can_meet_light) return false;
+    if (looks_for_light_alone(path) && !scene.can_meet_light) {
+        note_cut(writer, path, 1.0f);
+        return false;
+    }
     *next = ray_from(spawn, ng, s.direction);
     return true;
 }

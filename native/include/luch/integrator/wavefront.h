@@ -29,6 +29,8 @@ enum WaveTotal : u32 {
     TOTAL_WALKS,
     TOTAL_WALK_STEPS,
     TOTAL_FLIGHTS,
+    TOTAL_CLAMPED,
+    TOTAL_CUT,
     TOTALS
 };
 
