@@ -82,6 +82,15 @@ class PyRenderer {
         facts["media"] = scene.has_media;
         facts["materials"] = scene.view.material_count;
         facts["structure"] = cpu::accel_name({false, renderer_->trees().kind()});
+        bool emission_programs = false, lamp_programs = false;
+        for (u32 m = 0; m < scene.view.material_count; ++m)
+            emission_programs = emission_programs || !scene.material_emission[m].constant;
+        for (u32 l = 0; l < scene.view.lights->lamp_count; ++l)
+            lamp_programs = lamp_programs || scene.view.lights->lamps[l].has_program;
+        facts["emission_programs"] = emission_programs;
+        facts["lamp_programs"] = lamp_programs;
+        facts["visible_lamps"] = scene.has_visible_lamps;
+        facts["world_program"] = scene.has_world && !scene.world_emission.constant;
         facts["one_group"] = renderer_->trees().is_one_group();
         return facts;
     }

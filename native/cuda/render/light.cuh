@@ -10,7 +10,7 @@ LUCH_STAGE(find_light) {
     if (k >= wave.counters[WAVE_RAYS]) return;
     bool missed = missed_all(wave.hits[k]);
     // Lamps that are seen through media: cross_media.
-    bool lamps = plan::LAMPS && task.scene.has_visible_lamps && !(plan::VOLUMES && wave.media);
+    bool lamps = plan::VISIBLE_LAMPS && task.scene.has_visible_lamps && !(plan::VOLUMES && wave.media);
     if (!missed && !lamps) return;
     u32 slot = wave.ray_slot[k];
     PathState path = load_path(wave, slot);
@@ -22,7 +22,7 @@ LUCH_STAGE(find_light) {
     if (lamps) find_lamps(task.scene, writer, path, ray, wave.hits[k].t, nullptr, shader, points);
     if (missed && leave_scene(task.scene, writer, path, ray, shader, points)) {
         Color radiance = task.scene.world_emission.radiance;
-        if (!task.scene.world_emission.constant) {
+        if (plan::WORLD_PROGRAM && !task.scene.world_emission.constant) {
             points.count = 1;
             setup_world_lane(path, ray.direction, points, 0);
             run_program(context_of(task.scene.view, task.scene.view.world_program, points, set, nullptr));

@@ -18,7 +18,7 @@ __device__ __forceinline__ MediumStack beyond(const RenderTask& task, u32 slot, 
 __device__ __forceinline__ Color sampled_emission(const RenderTask& task, const PathState& path, u32 slot,
                                                   const LightSample& sample, float footprint) {
     ConstantEmission constant = emission_of(task.scene, sample);
-    if (constant.constant) return constant.radiance;
+    if (!plan::SAMPLED_PROGRAMS || constant.constant) return constant.radiance;
     ShadePoints points;
     ClosureSet set;
     points.count = 1;

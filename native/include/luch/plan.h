@@ -18,8 +18,23 @@
 #ifndef LUCH_PLAN_MICROFACETS
 #define LUCH_PLAN_MICROFACETS 1
 #endif
-#ifndef LUCH_PLAN_LAMPS
-#define LUCH_PLAN_LAMPS 1
+#ifndef LUCH_PLAN_ROUND_LAMPS
+#define LUCH_PLAN_ROUND_LAMPS 1
+#endif
+#ifndef LUCH_PLAN_AREA_LAMPS
+#define LUCH_PLAN_AREA_LAMPS 1
+#endif
+#ifndef LUCH_PLAN_VISIBLE_LAMPS
+#define LUCH_PLAN_VISIBLE_LAMPS 1
+#endif
+#ifndef LUCH_PLAN_LAMP_PROGRAMS
+#define LUCH_PLAN_LAMP_PROGRAMS 1
+#endif
+#ifndef LUCH_PLAN_EMISSION_PROGRAMS
+#define LUCH_PLAN_EMISSION_PROGRAMS 1
+#endif
+#ifndef LUCH_PLAN_WORLD_PROGRAM
+#define LUCH_PLAN_WORLD_PROGRAM 1
 #endif
 #ifndef LUCH_PLAN_SUNS
 #define LUCH_PLAN_SUNS 1
@@ -65,7 +80,14 @@ inline constexpr bool SHEEN = LUCH_PLAN_SHEEN;  // Sheen and velvet lobes
 inline constexpr bool TOON = LUCH_PLAN_TOON;
 inline constexpr bool ASHIKHMIN_SHIRLEY = LUCH_PLAN_ASHIKHMIN_SHIRLEY;
 inline constexpr bool MICROFACETS = LUCH_PLAN_MICROFACETS;
-inline constexpr bool LAMPS = LUCH_PLAN_LAMPS;  // other than suns
+inline constexpr bool ROUND_LAMPS = LUCH_PLAN_ROUND_LAMPS;  // point and spot
+inline constexpr bool AREA_LAMPS = LUCH_PLAN_AREA_LAMPS;
+inline constexpr bool VISIBLE_LAMPS = LUCH_PLAN_VISIBLE_LAMPS;  // rays look for them
+inline constexpr bool LAMP_PROGRAMS = LUCH_PLAN_LAMP_PROGRAMS;  // a lamp has nodes
+inline constexpr bool EMISSION_PROGRAMS =
+    LUCH_PLAN_EMISSION_PROGRAMS;  // a surface's emission is not the same everywhere
+inline constexpr bool WORLD_PROGRAM = LUCH_PLAN_WORLD_PROGRAM;  // the world is not of one colour
+inline constexpr bool LAMPS = ROUND_LAMPS || AREA_LAMPS;  // other than suns
 inline constexpr bool SUNS = LUCH_PLAN_SUNS;
 inline constexpr bool EMISSIVE_MESHES = LUCH_PLAN_EMISSIVE_MESHES;
 inline constexpr bool WORLD_SAMPLING = LUCH_PLAN_WORLD_SAMPLING;
@@ -78,5 +100,8 @@ inline constexpr bool HOLDOUT = LUCH_PLAN_HOLDOUT;
 inline constexpr bool CLAMPING = LUCH_PLAN_CLAMPING;
 inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin walls
 inline constexpr bool VOLUMES = LUCH_PLAN_VOLUMES;
+
+// A light that was chosen may have a program to ask for its emission.
+inline constexpr bool SAMPLED_PROGRAMS = EMISSION_PROGRAMS || LAMP_PROGRAMS || (WORLD_PROGRAM && WORLD_SAMPLING);
 
 }  // namespace luch::plan

@@ -5,7 +5,8 @@ The rule is one-sided: code is left out only where no effect that needs it is on
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from luch.effects import Effects
 from luch.effects.forcing import ALL
@@ -14,7 +15,8 @@ from luch.effects.forcing import ALL
 NEEDED_BY: dict[str, tuple[str, ...]] = {
     "THIN_FILM": ("thin film",),
     "SHEEN": ("sheen",),
-    "LAMPS": ("point lamps", "spot lamps", "area lamps"),
+    "ROUND_LAMPS": ("point lamps", "spot lamps"),
+    "AREA_LAMPS": ("area lamps",),
     "SUNS": ("sun lamps",),
     "EMISSIVE_MESHES": ("emissive meshes",),
     "WORLD_SAMPLING": ("world light sampling",),
@@ -34,6 +36,13 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "SUBSURFACE": ("subsurface",),
     "VOLUMES": ("volumes",),
 }  # fmt: skip
+# Define -> what the core says of the scene as it will be rendered (core.render.Renderer.device_facts).
+TOLD = {
+    "VISIBLE_LAMPS": "visible_lamps",
+    "LAMP_PROGRAMS": "lamp_programs",
+    "EMISSION_PROGRAMS": "emission_programs",
+    "WORLD_PROGRAM": "world_program",
+}
 # Define -> operations of shader programs that make such lobes.
 MADE_BY: dict[str, tuple[str, ...]] = {
     "TOON": ("CLOSURE_TOON",),
@@ -50,11 +59,14 @@ MADE_BY: dict[str, tuple[str, ...]] = {
 }
 
 
-def plan_of(effects: Effects, operations: set[str], forced: Iterable[str] = ()) -> dict[str, bool]:
+def plan_of(
+    effects: Effects, operations: set[str], facts: Mapping[str, Any], forced: Iterable[str] = ()
+) -> dict[str, bool]:
     """Which code a scene needs. operations: names of those that its programs hold. forced: Settings.force_effects."""
     if ALL in forced:
-        return dict.fromkeys([*NEEDED_BY, *MADE_BY], True)
+        return dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD], True)
     plan = {define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()}
+    plan |= {define: bool(facts[name]) for define, name in TOLD.items()}
     plan |= {define: any(name in operations for name in names) for define, names in MADE_BY.items()}
     return plan
 

@@ -37,7 +37,7 @@ class SceneKernels:
             f"-DLUCH_STRUCTURE={structure}",
         ]
         forced = scene.settings.force_effects
-        self.plan = plans.plan_of(effects_of(scene), operations(programs, instructions), forced)
+        self.plan = plans.plan_of(effects_of(scene), operations(programs, instructions), facts, forced)
         self._flags += plans.flags(self.plan)
         self._precision = precision
         self._module: Module | None = None

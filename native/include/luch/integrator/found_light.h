@@ -11,7 +11,7 @@ template <class Shader>
 LUCH_FN Color eval_lamp(const RenderView& scene, const PathState& path, const LampHit& hit, const Ray& ray,
                         Shader& shader, ShadePoints& points) {
     const LampView& lamp = scene.view.lights->lamps[hit.lamp];
-    if (!lamp.has_program) return make_vec3(1.0f);
+    if (!plan::LAMP_PROGRAMS || !lamp.has_program) return make_vec3(1.0f);
     points.count = 1;
     LaneInputs in;
     in.point = finite_f(hit.t) ? ray.origin + ray.direction * hit.t : ray.direction;

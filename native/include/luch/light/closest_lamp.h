@@ -43,10 +43,12 @@ LUCH_FN_SLOW void try_lamp(const LightsView& lights, u32 index, const Ray& ray, 
 LUCH_FN_SLOW void finish_lamp_hit(const LampView& lamp, Vec3 origin, Vec3 direction, LampHit* hit) {
     Vec3 point = origin + direction * hit->t;
     hit->normal = -direction;
-    if (lamp.kind == LampKind::SPHERE) hit->normal = normalize_or(point - lamp.position, -direction);
-    if (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE) hit->normal = lamp.direction;
-    bool inside = lamp.kind == LampKind::SPHERE && length_squared(origin - lamp.position) <= sqr(lamp.radius);
+    if (is_round(lamp) && lamp.kind == LampKind::SPHERE) hit->normal = normalize_or(point - lamp.position, -direction);
+    if (is_area(lamp)) hit->normal = lamp.direction;
+    bool inside =
+        is_round(lamp) && lamp.kind == LampKind::SPHERE && length_squared(origin - lamp.position) <= sqr(lamp.radius);
     hit->radiance = inside ? lamp.radiance : lamp_radiance_towards(lamp, -direction);
+    if constexpr (!plan::LAMP_PROGRAMS) return;
     Vec2 uv = lamp_parametric(lamp, point, hit->normal, -direction);
     hit->u = uv.x;
     hit->v = uv.y;
@@ -91,6 +93,7 @@ LUCH_FN_SLOW LampHit sun_hit(const SceneView& scene, u32 sun, Vec3 direction, u3
     hit.lamp = index;
     hit.radiance = lamp.radiance;
     hit.normal = -direction;
+    if constexpr (!plan::LAMP_PROGRAMS) return hit;
     Vec2 uv = lamp_parametric(lamp, direction, hit.normal, -direction);
     hit.u = uv.x;
     hit.v = uv.y;

@@ -3,6 +3,7 @@
 #pragma once
 #include "luch/light/light.h"
 #include "luch/light/polygon.h"
+#include "luch/plan.h"
 
 namespace luch {
 
@@ -14,6 +15,17 @@ struct LampSample {
     float u, v;
     Vec3 point, normal;
 };
+
+// What a scene has no lamp of is known when its kernels are compiled.
+LUCH_FN bool is_sun(const LampView& lamp) { return plan::SUNS && lamp.kind == LampKind::SUN; }
+LUCH_FN bool is_area(const LampView& lamp) {
+    if constexpr (plan::AREA_LAMPS && !plan::ROUND_LAMPS && !plan::SUNS) return true;
+    return plan::AREA_LAMPS && (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE);
+}
+LUCH_FN bool is_round(const LampView& lamp) {
+    if constexpr (plan::ROUND_LAMPS && !plan::AREA_LAMPS && !plan::SUNS) return true;
+    return plan::ROUND_LAMPS && (lamp.kind == LampKind::SPHERE || lamp.kind == LampKind::DISK);
+}
 
 LUCH_FN Vec3 lamp_local_direction(const LampView& lamp, Vec3 d) {
     const float* m = lamp.to_local;
@@ -42,12 +54,12 @@ LUCH_FN float spread_attenuation(const LampView& lamp, Vec3 outward) {
 
 // What Geometry > Parametric gives on the lamp. outward: unit, from the lamp towards the shaded point.
 LUCH_FN_SLOW Vec2 lamp_parametric(const LampView& lamp, Vec3 point, Vec3 normal, Vec3 outward) {
-    if (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE) {
+    if (is_area(lamp)) {
         Vec3 q = point - lamp.position;
         return {saturate_f(0.5f + 0.5f * safe_divide(dot(q, lamp.axis_u), lamp.half_u)),
                 saturate_f(0.5f + 0.5f * safe_divide(dot(q, lamp.axis_v), lamp.half_v))};
     }
-    if (lamp.kind == LampKind::SUN) {
+    if (is_sun(lamp)) {
         // The disk of directions: the radius is the chord from the axis, 1/2 at the sun's edge.
         Vec3 to_sun = -outward;
         float edge_chord = sqrt_f(2.0f * lamp.one_minus_cos_half_angle);
@@ -67,8 +79,7 @@ LUCH_FN_SLOW Vec2 lamp_parametric(const LampView& lamp, Vec3 point, Vec3 normal,
 
 LUCH_FN Color lamp_radiance_towards(const LampView& lamp, Vec3 outward) {
     if (lamp.spot) return lamp.radiance * spot_attenuation(lamp, outward);
-    if (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE)
-        return lamp.radiance * spread_attenuation(lamp, outward);
+    if (is_area(lamp)) return lamp.radiance * spread_attenuation(lamp, outward);
     return lamp.radiance;
 }
 
@@ -300,17 +311,19 @@ LUCH_FN LampSample sample_point(const LampView& lamp, Vec3 p) {
 
 LUCH_FN_SLOW LampSample sample_lamp(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec2 u) {
     LampSample s;
-    if (lamp.kind == LampKind::SUN) {
+    if (is_sun(lamp)) {
         s = sample_sun(lamp, u);
-    } else if (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE) {
+    } else if (is_area(lamp)) {
         s = lamp.delta ? sample_parallel_area(lamp, p) : sample_area(lamp, p, u);
+    } else if (!is_round(lamp)) {
+        s = LampSample{};
     } else if (lamp.delta) {
         s = sample_point(lamp, p);
     } else {
         s = lamp.kind == LampKind::DISK ? sample_facing_disk(lamp, p, u) : sample_sphere(lamp, p, n, transmits, u);
     }
     s.valid = s.valid && !is_zero(s.radiance);
-    if (s.valid && lamp.has_program) {
+    if (plan::LAMP_PROGRAMS && s.valid && lamp.has_program) {
         Vec2 uv = lamp_parametric(lamp, s.point, s.normal, -s.direction);
         s.u = uv.x;
         s.v = uv.y;
@@ -321,22 +334,17 @@ LUCH_FN_SLOW LampSample sample_lamp(const LampView& lamp, Vec3 p, Vec3 n, bool t
 // Density with which sample_lamp would have chosen this direction. distance: to the hit on the lamp.
 LUCH_FN_SLOW float lamp_pdf(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec3 direction, float distance) {
     if (lamp.delta) return 0.0f;
-    switch (lamp.kind) {
-        case LampKind::SPHERE:
-            return sphere_pdf(lamp, p, n, transmits, direction);
-        case LampKind::DISK:
-            return area_pdf_sa(distance, length(lamp.position - p), PI * lamp.radius * lamp.radius);
-        case LampKind::SUN:
-            return 1.0f / (TWO_PI * lamp.one_minus_cos_half_angle);
-        default:
-            return area_region_pdf(make_area_region(lamp, p), distance);
-    }
+    if (is_sun(lamp)) return 1.0f / (TWO_PI * lamp.one_minus_cos_half_angle);
+    if (is_area(lamp)) return area_region_pdf(make_area_region(lamp, p), distance);
+    if (!is_round(lamp)) return 0.0f;
+    if (lamp.kind == LampKind::SPHERE) return sphere_pdf(lamp, p, n, transmits, direction);
+    return area_pdf_sa(distance, length(lamp.position - p), PI * lamp.radius * lamp.radius);
 }
 
 // Distance to the lamp along a unit direction; negative: not hit. A sphere's far side counts only from inside.
 LUCH_FN_SLOW float intersect_lamp(const LampView& lamp, Vec3 origin, Vec3 direction) {
     Vec3 from = origin - lamp.position;
-    if (lamp.kind == LampKind::SPHERE || lamp.kind == LampKind::DISK) {
+    if (is_round(lamp)) {
         if (lamp.spot && dot(direction, from) >= 0.0f) return -1.0f;  // a spot's own back shows nothing
         if (lamp.kind == LampKind::SPHERE) return sphere_crossing(from, direction, lamp.radius);
         float d2 = length_squared(from);

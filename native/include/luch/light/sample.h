@@ -267,9 +267,9 @@ LUCH_FN_SLOW float pdf_lamp(const SceneView& scene, Vec3 p, Vec3 n, bool transmi
     GroupShares shares;
     group_shares(lights, q, &shares);
     // From p itself: a ray that went straight through surfaces began its last piece elsewhere.
-    float distance = lamp.kind == LampKind::SUN ? INFINITE_DISTANCE : intersect_lamp(lamp, p, direction);
+    float distance = is_sun(lamp) ? INFINITE_DISTANCE : intersect_lamp(lamp, p, direction);
     float pdf = lamp_pdf(lamp, p, n, transmits, direction, distance > 0.0f ? distance : hit.t);
-    if (lamp.kind == LampKind::SUN) return pdf * shares.suns * sun_probability(lights, q, lamp.emitter);
+    if (is_sun(lamp)) return pdf * shares.suns * sun_probability(lights, q, lamp.emitter);
     if (lamp.emitter == NONE || !(shares.local > 0.0f)) return 0.0f;
     return pdf * shares.local * local_probability(lights, q, lamp.emitter);
 }
