@@ -179,7 +179,7 @@ def judge(options: argparse.Namespace) -> int:
         row = {"scene": name, "seconds": told["seconds"], "fixed": told["fixed"], "stages": told["stages"],
                "error": pictures.rel_mse(own[name], reference), "energy": [float(part) for part in energy]}  # fmt: skip
         for backend, of in peers.items():
-            picture = pictures.read_passes(options.out / f"{name}-{backend}.exr")["Combined"][..., :3]
+            (picture,) = pictures.read_passes(options.out / f"{name}-{backend}.exr").values()
             error = pictures.rel_mse(picture, reference)
             row[backend] = {**of[name], "error": error,
                             "ratio": row["seconds"] * row["error"] / (of[name]["seconds"] * error)}  # fmt: skip
