@@ -32,7 +32,7 @@ LUCH_STAGE(cross_media) {
     ShadePoints points;
     ClosureSet set;
     PointShader shader{task.scene.view, set};
-    if (plan::LAMPS && task.scene.has_visible_lamps)
+    if (plan::VISIBLE_LAMPS && task.scene.has_visible_lamps)
         find_lamps(task.scene, writer, path, ray, reach, &stack, shader, points);
     if (is_in_medium(task.scene.media, stack)) {
         const Flight flight = make_flight(task.scene.media, stack, path, reach);
