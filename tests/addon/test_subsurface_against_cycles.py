@@ -51,6 +51,25 @@ def slab(skin: bpy.types.Material) -> bpy.types.Object:
     return made
 
 
+def instances() -> None:
+    """One mesh three times, stretched and mirrored; the three meet."""
+    first = sphere(material("Subsurface", **WIDE), (0.5, 0.5, 0.5))
+    for at, size in (((0.5, 0.6, 0.1), (0.8, 0.3, 0.5)), ((-0.6, -0.6, -0.1), (0.4, -0.3, 0.5))):
+        copy = bpy.data.objects.new("Copy", first.data)
+        copy.location, copy.scale, copy.rotation_euler = at, size, (0.3, 0.5, 0.2)
+        bpy.context.scene.collection.objects.link(copy)
+
+
+def bumped(skin: bpy.types.Material) -> bpy.types.Material:
+    tree = skin.node_tree
+    node = next(n for n in tree.nodes if "Normal" in n.inputs)
+    noise, bump = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeBump")
+    noise.inputs["Scale"].default_value, bump.inputs["Distance"].default_value = 6.0, 0.3
+    tree.links.new(noise.outputs[0], bump.inputs["Height"])
+    tree.links.new(bump.outputs[0], node.inputs["Normal"])
+    return skin
+
+
 def light_and_look(scene: bpy.types.Scene) -> None:
     """A square lamp behind to the left, a dim world, a camera from above."""
     bpy.ops.object.light_add(type="AREA", location=(-3.0, 1.0, -2.0))
@@ -106,6 +125,9 @@ CASES: dict[str, Callable[[], object]] = {
         material("Principled", "RANDOM_WALK_SKIN", Base_Color=SKIN, Subsurface_Weight=1.0, Subsurface_Scale=0.3,
                  Subsurface_IOR=1.6, Coat_Weight=0.5, Metallic=0.2)
     ),
+    "burley": lambda: sphere(material("Subsurface", "BURLEY", **{**WIDE, "Scale": 1.0})),
+    "instances": instances,
+    "bump": lambda: sphere(bumped(material("Subsurface", **WIDE))),
     "stretched": lambda: sphere(material("Subsurface", **WIDE), (1.0, 0.4, 1.3)),
     "dark and tiny": lambda: sphere(material("Subsurface", Color=(0.9, 0.05, 0.0), Scale=0.05, Radius=(1.0, 0.5, 0.0))),
 }  # fmt: skip

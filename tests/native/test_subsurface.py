@@ -180,9 +180,11 @@ def layered(builder: ProgramBuilder) -> None:
 
 
 def everything_inside() -> Scene:
-    """Three instances of two methods, one of them stretched, a lamp, a world that varies."""
-    places = [at(0, 0, 0), at(-0.5, 0.5, 0.4, (0.6, 0.4, 1.0)), at(0.9, 0.2, 0.6, (0.3, 0.3, 0.3))]
-    scene = room([cube(), cube("Other", 0.8)], [wax(g=0.3), layered], places, samples=4)
+    """Four instances of three methods, two of them stretched, a lamp."""
+    places = [at(0, 0, 0), at(-0.5, 0.5, 0.4, (0.6, 0.4, 1.0)), at(0.6, -0.6, 0.7, (0.4, 0.3, 0.4)),
+              at(0.9, 0.2, 0.6, (0.3, 0.3, 0.3))]  # fmt: skip
+    builds = [wax(g=0.3), layered, wax(radius=1.0, method=BURLEY)]
+    scene = room([cube(), cube("Other", 0.8), cube("Disk")], builds, places, samples=4)
     scene.lights = [Light("Bulb", "POINT", matrix=at(1.0, 0.5, 4.0), power=300.0, radius=0.3)]
     scene.camera = replace(scene.camera, ortho_scale=3.0)
     scene.film.passes = ["Combined", "Diffuse Direct", "Diffuse Indirect", "Glossy Direct", "Ambient Occlusion"]

@@ -152,16 +152,10 @@ def principled(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     walks = b.known(thin_wall) in (None, 0.0) and b.known(c.float(node, "Subsurface Weight")) != 0.0
     if walks and b.known_vector(radius) != (0.0, 0.0, 0.0):
         inputs = [*radius, c.float(node, "Subsurface IOR"), *inputs]
-        method = _subsurface_method(c, node, node.subsurface_method)
+        method = _SUBSURFACE[node.subsurface_method]
         b.closure("CLOSURE_PRINCIPLED_SUBSURFACE", weight, inputs, (*params, method))
     else:
         b.closure("CLOSURE_PRINCIPLED", weight, inputs, params)
-
-
-def _subsurface_method(c: Compiler, node: bpy.types.Node, method: str) -> int:
-    if method == "BURLEY":
-        c.warn(node, "asks for Christensen-Burley, which is drawn by a random walk for now")
-    return _SUBSURFACE[method]
 
 
 def _subsurface_radius(c: Compiler, node: bpy.types.Node, radius: str, scale: str) -> Vector:
@@ -210,7 +204,7 @@ def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
         return
     scalars = (c.float(node, "IOR"), c.float(node, "Roughness"), c.float(node, "Anisotropy"))
     inputs = (*color, *radius, *scalars, *_normal(c, node))
-    c.builder.closure("CLOSURE_SUBSURFACE", weight, inputs, _params(c, _subsurface_method(c, node, node.falloff)))
+    c.builder.closure("CLOSURE_SUBSURFACE", weight, inputs, _params(c, _SUBSURFACE[node.falloff]))
 
 
 @closure_emitter("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled")

@@ -2,6 +2,7 @@
 #include "cpu/accel/local_trees.h"
 #include "cpu/integrator/batch.h"
 #include "cpu/integrator/scratch.h"
+#include "luch/integrator/subsurface_disk.h"
 
 namespace luch::cpu {
 namespace {
@@ -28,7 +29,7 @@ void Batch::walk_subsurface() {
     counts_.subsurface_walks += u64(walk_count_);
     int exits = 0;
     for (int i = 0; i < walk_count_; i++) {
-        walk_inside(walks_[size_t(i)], tracer, &counts_.subsurface_steps);
+        pass_inside(scene_.view, walks_[size_t(i)], tracer, &counts_.subsurface_steps);
         if (walks_[size_t(i)].hit.instance == NONE) continue;
         if (exits != i) walks_[size_t(exits)] = walks_[size_t(i)];
         exits++;

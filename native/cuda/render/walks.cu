@@ -2,7 +2,7 @@
 #include "luch/accel/local_trees.h"
 #include "luch/integrator/wavefront.h"
 
-#include "luch/integrator/subsurface.h"
+#include "luch/integrator/subsurface_disk.h"
 
 namespace luch {
 
@@ -41,6 +41,11 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK)
             at = atomicAdd(wave.counters + WAVE_WALKED, 1u);
             if (at >= count) break;
             walk = wave.walks[at];
+            if (walk.probe) {
+                probe_disk(task.scene.view, walk, tracer, &steps);
+                store_end(wave.walks + at, walk, WalkFate::LEAVES);
+                continue;
+            }
             plan = begin_walk(walk);
             walking = true;
         }

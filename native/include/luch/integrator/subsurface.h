@@ -23,9 +23,9 @@ inline constexpr u32 WALK_FIRST_DIMENSION = 0x10000u;  // above those of every p
 
 // A path under the surface. The queue between the stage at a surface and that where it comes out.
 struct alignas(16) SubsurfaceWalk {
-    Vec3 entry;           // where it went in, just under the surface, world
+    Vec3 entry;           // where it went in, world; of a walk just under the surface
     u32 ray;              // that brought it, of this generation
-    Vec3 normal;          // interpolated, unit, where it went in, outwards
+    Vec3 normal;          // unit, where it went in, outwards: interpolated, of a probe the face's
     u32 instance;         // that it is in
     Vec3 position;        // where the last step began
     u32 steps;
@@ -35,7 +35,9 @@ struct alignas(16) SubsurfaceWalk {
     u32 random;           // state of the hashed numbers
     Color radius, color;  // of the lobe
     float anisotropy;
-    u32 older;            // albedo by the fit of Blender's older methods
+    bool older;           // albedo by the fit of Blender's older methods
+    bool probe;           // no walk, but a probe of a profile (integrator/subsurface_disk.h)
+    bool back;            // of a probe: it went in where the face is seen from behind
     Sampler sampler;
     u32 dimension;        // of the numbers of the first steps
     Hit hit;              // where it comes out; instance NONE: it does not
@@ -80,14 +82,21 @@ LUCH_FN bool enter_subsurface(PathState& path, const ShadePoints& points, int la
                               const SurfacePoint& spawn, Vec2 u, u32 ray, SubsurfaceWalk* walk) {
     const Lobe& lobe = set.lobes[chosen];
     Vec3 ng = lane_face_normal(points, lane);
-    if (!refract_inside(lobe, lane_to_viewer(points, lane), u, &walk->direction)) return false;
-    if (!(dot(ng, walk->direction) < 0.0f)) return false;
     float probability = lobe.sample_weight / (average(set.transparent) + lobe_weight_sum(set));
-    // The albedo comes back by scattering.
-    walk->throughput = path.throughput * share(lobe.weight, lobe.c0) * (1.0f / probability);
+    walk->throughput = path.throughput * lobe.weight * (1.0f / probability);
+    walk->probe = lobe.type == LobeType::SUBSURFACE_DISK;
+    walk->back = points.flags[lane] & PATH_BACKFACING;
+    walk->entry = spawn.p;
+    walk->normal = ng;
+    if (!walk->probe) {
+        if (!refract_inside(lobe, lane_to_viewer(points, lane), u, &walk->direction)) return false;
+        if (!(dot(ng, walk->direction) < 0.0f)) return false;
+        // The albedo comes back by scattering.
+        walk->throughput = share(walk->throughput, lobe.c0);
+        walk->entry = walk->position = offset_origin(spawn, ng, walk->direction);
+        walk->normal = lane_normal(points, lane);
+    }
     path.flags &= ~u32(PATH_CAMERA);
-    walk->entry = walk->position = offset_origin(spawn, ng, walk->direction);
-    walk->normal = lane_normal(points, lane);
     walk->instance = points.instance[lane];
     walk->ray = ray;
     walk->color = lobe.c0;
@@ -176,13 +185,21 @@ LUCH_FN void choose_direction(SubsurfaceWalk& walk, const Guide& guide, float g,
     if (guided) *stretch = back ? step.backward : step.forward;
 }
 
-LUCH_FN WalkStep begin_step(SubsurfaceWalk& walk, const Medium& medium, const Guide& guide) {
+// What a walk keeps from step to step beside its state.
+struct WalkPlan {
+    Medium medium;
+    Guide guide;
+    float guided;  // share of steps that are guided at first; narrow phase functions leave little to guide
+};
+
+LUCH_FN WalkStep begin_step(SubsurfaceWalk& walk, const WalkPlan& plan) {
+    const Medium& medium = plan.medium;
     StepNumbers u = step_numbers(walk);
     WalkStep step;
     float g = medium.anisotropy;
     step.extinction = medium.extinction;
     step.scattering = medium.extinction * medium.albedo;
-    step.guided = min_f(0.5f, 1.0f - pow_f(abs_f(g), 0.125f));
+    step.guided = plan.guided;
     if (walk.steps >= WALK_ISOTROPIC_FROM) {
         Color reduced = step.scattering * (1.0f - g);
         step.extinction += reduced - step.scattering;
@@ -195,7 +212,7 @@ LUCH_FN WalkStep begin_step(SubsurfaceWalk& walk, const Medium& medium, const Gu
     step.forward = step.backward = 1.0f;
     step.forward_ratio = step.backward_ratio = step.backward_share = 0.0f;
     float stretch = 1.0f;
-    if (walk.steps > 0) choose_direction(walk, guide, g, u, &stretch, step);
+    if (walk.steps > 0) choose_direction(walk, plan.guide, g, u, &stretch, step);
     step.distance = step.reach = -log_f(1.0f - u.distance) / (stretch * step.extinction[channel]);
     if (walk.steps == 0) {
         float thinnest = min_f(step.extinction.x, min_f(step.extinction.y, step.extinction.z));
@@ -244,23 +261,18 @@ LUCH_FN WalkFate finish_step(SubsurfaceWalk& walk, const WalkStep& step, const H
     return ++walk.steps < WALK_STEPS ? WalkFate::GOES_ON : WalkFate::LOST;
 }
 
-// What a walk keeps from step to step beside its state.
-struct WalkPlan {
-    Medium medium;
-    Guide guide;
-};
 LUCH_FN WalkPlan begin_walk(SubsurfaceWalk& walk) {
-    Medium medium = medium_of(walk.color, walk.radius, walk.anisotropy, walk.older != 0, &walk.throughput);
+    Medium medium = medium_of(walk.color, walk.radius, walk.anisotropy, walk.older, &walk.throughput);
     walk.steps = 0;
     walk.opposite = -1.0f;
     // One guide for all channels: that of the brightest is safe for the others, a tighter one makes fireflies.
-    return {medium, guide_of(max_component(medium.albedo))};
+    return {medium, guide_of(max_component(medium.albedo)), min_f(0.5f, 1.0f - pow_f(abs_f(walk.anisotropy), 0.125f))};
 }
 
 // tracer.closest(instance, ray): the nearest hit in that instance alone.
 template <class Tracer>
 LUCH_FN WalkFate take_step(SubsurfaceWalk& walk, const WalkPlan& plan, Tracer& tracer) {
-    WalkStep step = begin_step(walk, plan.medium, plan.guide);
+    WalkStep step = begin_step(walk, plan);
     Ray ray = {walk.position, 0.0f, walk.direction, step.reach};
     Hit hit = tracer.closest(walk.instance, ray);
     return finish_step(walk, step, hit);
