@@ -13,6 +13,7 @@ void bind_accel(py::module_& m);
 void bind_kd_short_stack(py::module_& m);
 void bind_light(py::module_& m);
 void bind_math(py::module_& m);
+void bind_media(py::module_& m);
 void bind_render(py::module_& m);
 void bind_sampling(py::module_& m);
 void bind_scene_trees(py::module_& m);

@@ -14,7 +14,7 @@ import pytest
 from luch.effects import effects_of
 from luch.effects.picture import PASSES
 from luch.render import Result, render
-from luch.scene import Camera, Film, Instances, Light, Material, Mesh, Object, Scene, Settings, World
+from luch.scene import Camera, Film, Instances, Light, Material, Medium, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder
 from luch.shader_code import OPS
 from support.effects import ONE, closure, principled, program
@@ -227,3 +227,19 @@ def test_lamp_nodes_run_only_where_a_lamp_has_them() -> None:
     scene.lights[0].program = program(build)
     assert effects_of(scene)["lamp nodes"].on
     assert rendered(scene)[0]["light_points"] > 0
+
+
+def test_volumes_cost_nothing_where_there_are_none() -> None:
+    empty = room()
+    without, plain = rendered(empty)
+    assert without["flights"] == 0
+    assert not effects_of(empty)["volumes"].on
+    empty.materials[0].volume = Medium()  # it holds nothing
+    same, result = rendered(empty)
+    assert same["flights"] == 0 and same_bits(plain, result)
+    empty.world = World("Night", program(None), volume=Medium((0.1, 0.1, 0.1)))
+    with_fog, foggy = rendered(empty)
+    assert with_fog["flights"] >= PATHS
+    assert foggy.passes["Combined"][..., :3].mean() < 0.7 * plain.passes["Combined"][..., :3].mean()
+    assert effects_of(empty)["volumes"].reason == 'world "Night" absorbs 0.1 0.1 0.1 per metre'
+    assert not effects_of(empty)["volume bounces"].on

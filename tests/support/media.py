@@ -70,7 +70,7 @@ def placed(meshes: list[Mesh], materials: list[Material], **fields: Any) -> Scen
 
 def slab(medium: Medium, thickness: float = 1.0, **fields: Any) -> Scene:
     """A wide slab, its top at z = 0."""
-    half = (50.0, 50.0, 0.5 * thickness)
+    half = (5.0, 5.0, 0.5 * thickness)
     return placed([box("Slab", half, (0.0, 0.0, -0.5 * thickness))], [fog(medium)], **fields)
 
 

@@ -13,7 +13,7 @@ def add_volumes(effects: Effects, shown: Shown) -> None:
     """Whether there are any, and which."""
     found = media_shown(shown)
     if not found:
-        idle = [surface.title for surface in shown.idle if surface.volume is not None]
+        idle = [surface.title for surface in shown.idle if surface.volume and holds(surface.volume)]
         note = f" ({idle[0]} has, but is on no face that is drawn)" if idle else ""
         effects.add("Geometry", "volumes", False, NONE + note)
         return
@@ -39,11 +39,16 @@ def add_volume_bounces(effects: Effects, shown: Shown) -> int:
 
 def media_shown(shown: Shown) -> list[tuple[str, Medium]]:
     """The owner of each medium that a ray can come into."""
-    found = [(surface.title, surface.volume) for surface in shown.surfaces if surface.volume is not None]
+    found = [(surface.title, surface.volume) for surface in shown.surfaces]
     world = shown.scene.world
-    if world is not None and world.volume is not None:
+    if world is not None:
         found.append((f'world "{world.name}"', world.volume))
-    return found
+    return [(title, medium) for title, medium in found if medium is not None and holds(medium)]
+
+
+def holds(medium: Medium) -> bool:
+    """Whether there is anything in it."""
+    return scatters(medium) or any((*medium.absorption, *medium.emission))
 
 
 def scatters(medium: Medium) -> bool:
@@ -59,4 +64,4 @@ def told(medium: Medium) -> str:
         for verb, numbers in (("absorbs", medium.absorption), ("scatters", scattering), ("emits", medium.emission))
         if any(numbers)
     ]
-    return f"{', '.join(parts) or 'holds nothing'} per metre"
+    return f"{', '.join(parts)} per metre"

@@ -20,7 +20,7 @@ struct PhaseLobe {
 };
 
 // Knots of a table: t, then the density per steradian at them, then the probability below them.
-inline constexpr u32 PHASE_KNOTS = 1025;
+inline constexpr u32 PHASE_KNOTS = 2049;
 
 // Of two unit vectors, exact for small angles: sin^2 of half the angle between them.
 LUCH_FN float half_angle_square(Vec3 a, Vec3 b) { return min_f(0.25f * length_squared(a - b), 1.0f); }
