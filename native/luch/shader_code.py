@@ -24,6 +24,7 @@ LIGHT_PATH = 16
 HOLDOUT = 32
 EMISSION_FRONT = 64
 EMISSION_BACK = 128
+EMISSION_BY_SIDE = 4096
 SUBSURFACE = 256
 SUBSURFACE_BUMP = 512
 
@@ -171,24 +172,31 @@ def program_flags(order: Sequence[Node], constant_of: Mapping[int, float], table
         if constant_emission(order, constant_of) is not None:
             flags |= CONSTANT_EMISSION
         else:
-            flags |= EMISSION_FRONT if _dark_when(order, 1.0, constant_of, tables) else 0
-            flags |= EMISSION_BACK if _dark_when(order, 0.0, constant_of, tables) else 0
+            behind, before = (_emission_when(order, side, constant_of, tables) for side in (1.0, 0.0))
+            flags |= EMISSION_FRONT if behind is not None and not any(behind) else 0
+            flags |= EMISSION_BACK if before is not None and not any(before) else 0
+            flags |= EMISSION_BY_SIDE if behind is not None and before is not None else 0
     return flags
 
 
-def _dark_when(order: Sequence[Node], backfacing: float, constant_of: Mapping[int, float], tables: F32) -> bool:
-    """Whether emission is known to be zero when Geometry > Backfacing has the given value."""
+def _emission_when(
+    order: Sequence[Node], backfacing: float, constant_of: Mapping[int, float], tables: F32
+) -> list[float] | None:
+    """Weights of the emission closures if all are known when Geometry > Backfacing has the given value."""
     if not any(node.op.name == _BACKFACING for node in order):
-        return False
-    known = dict(constant_of)
+        return None
+    known, weights = dict(constant_of), list[float]()
     for node in order:
         if emits(node):
-            return False
-        if node.op.name == "CLOSURE_EMISSION" and any(known.get(value) != 0.0 for value in node.inputs[:3]):
-            return False
+            return None
+        numbers = [known.get(value) for value in node.inputs]
+        if node.op.name == "CLOSURE_EMISSION":
+            told = [number for number in numbers[:3] if number is not None]
+            if len(told) < 3:
+                return None
+            weights += told
         if node.op.closure:
             continue
-        numbers = [known.get(value) for value in node.inputs]
         if node.op.name == _BACKFACING:
             known[node.first] = backfacing
         elif node.op.name == "MATH_MULTIPLY" and 0.0 in numbers:
@@ -196,7 +204,7 @@ def _dark_when(order: Sequence[Node], backfacing: float, constant_of: Mapping[in
         elif node.op.constant and None not in numbers:
             outputs = run_constant(node.op, [number for number in numbers if number is not None], node.params, tables)
             known.update({node.first + k: number for k, number in enumerate(outputs)})
-    return True
+    return weights
 
 
 def emits(node: Node) -> bool:

@@ -215,6 +215,27 @@ def test_bounces_of_a_kind_that_no_surface_has_cost_nothing() -> None:
     assert first["rays"] == second["rays"] and same_bits(a, b)
 
 
+def one_sided(builder: ProgramBuilder) -> None:
+    """Shines downwards red, upwards a little blue."""
+    behind = builder.op1("POINT_BACKFACING")
+    before = builder.op1("MATH_SUBTRACT", (builder.constant(1.0), behind))
+    closure(builder, "CLOSURE_EMISSION", {}, weight=(behind, builder.constant(0.0), before))
+
+
+def test_a_light_whose_sides_are_each_of_one_colour_runs_no_program_to_be_sampled() -> None:
+    scene = room(one_sided)
+    scene.lights = []
+    stats, lean = rendered(scene)
+    assert stats["light_points"] == 0
+    assert stats["shadow_rays"] > 0, "the leaf is chosen as a light"
+    scene.settings.force_effects = ["emissive meshes"]
+    stats, full = rendered(scene)
+    assert stats["light_points"] > 0
+    assert same_bits(lean, full)
+    red, green, blue = lean.passes["Combined"][..., :3].reshape(-1, 3).mean(0)
+    assert red > 0.01 and green == 0.0 and blue > 0.01
+
+
 def test_lamp_nodes_run_only_where_a_lamp_has_them() -> None:
     scene = room()
     assert rendered(scene)[0]["light_points"] == 0

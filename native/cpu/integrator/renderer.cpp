@@ -165,13 +165,20 @@ void Renderer::find_constants() {
     in.instance = in.prim = NONE;
     in.flags = PATH_EMISSION_ONLY;
     setup_free_lane(in, {0.0f, 0.0f, 1.0f}, points, 0);
+    ShadePoints seen_from_behind = points;
+    seen_from_behind.flags[0] |= PATH_BACKFACING;
     for (u32 m = 0; m < view.material_count; m++) {
         const Program& program = view.materials[m].program;
         registers = std::max(registers, size_t(program.register_count));
         ConstantEmission emission{};
         emission.constant = !(program.flags & PROGRAM_EMISSION) || (program.flags & PROGRAM_CONSTANT_EMISSION);
         if (program.flags & PROGRAM_CONSTANT_EMISSION) emission.radiance = evaluate_emission(view, program, points);
-        if (input_.forced.emission) emission.constant = false;
+        if (program.flags & PROGRAM_EMISSION_BY_SIDE) {
+            emission.constant = emission.by_side = true;
+            emission.radiance = evaluate_emission(view, program, points);
+            emission.behind = evaluate_emission(view, program, seen_from_behind);
+        }
+        if (input_.forced.emission) emission.constant = emission.by_side = false;
         scene_.emission_of_materials.push_back(emission);
     }
     scene_.material_emission = scene_.emission_of_materials.data();
@@ -184,9 +191,9 @@ void Renderer::find_constants() {
     scene_.world_lightgroup = input_.world.lightgroup;
     const u32 world_flags = view.world_program.flags;
     if (input_.world.present && (world_flags & PROGRAM_CONSTANT_EMISSION)) {
-        scene_.world_emission = {true, evaluate_emission(view, view.world_program, points)};
+        scene_.world_emission = {true, evaluate_emission(view, view.world_program, points), false, {}};
     } else if (!(world_flags & PROGRAM_EMISSION)) {
-        scene_.world_emission = {true, make_vec3(0.0f)};
+        scene_.world_emission = {true, make_vec3(0.0f), false, {}};
     }
     if (scene_.world_emission.constant && is_zero(scene_.world_emission.radiance)) scene_.has_world = false;
 }

@@ -32,9 +32,16 @@ LUCH_FN bool choose_light(const RenderView& scene, const PathState& path, const 
 }
 
 LUCH_FN ConstantEmission emission_of(const RenderView& scene, const LightSample& s) {
-    if (s.kind == EmitterKind::LAMP) return {!scene.view.lights->lamps[s.lamp].has_program, {1.0f, 1.0f, 1.0f}};
+    if (s.kind == EmitterKind::LAMP)
+        return {!scene.view.lights->lamps[s.lamp].has_program, {1.0f, 1.0f, 1.0f}, false, {}};
     if (s.kind == EmitterKind::WORLD) return scene.world_emission;
-    return scene.material_emission[material_at(scene.view, s.instance, s.prim)];
+    ConstantEmission emission = scene.material_emission[material_at(scene.view, s.instance, s.prim)];
+    if (emission.by_side) {  // the side as setup_surface_lane tells it
+        const InstanceView& instance = scene.view.instances[s.instance];
+        Vec3 ng = world_face_normal(instance, triangle_at(scene.view, scene.view.meshes[instance.mesh], s.prim));
+        if (dot(ng, -s.direction) < 0.0f) emission.radiance = emission.behind;
+    }
+    return emission;
 }
 
 LUCH_FN const Program& program_of(const RenderView& scene, const LightSample& s) {

@@ -10,10 +10,12 @@
 
 namespace luch {
 
-// Emission of a program that is the same everywhere, evaluated once.
+// Emission of a program that is the same everywhere, or everywhere on a side, evaluated once.
 struct ConstantEmission {
     bool constant;
     Color radiance;
+    bool by_side;
+    Color behind;  // where the back face is seen
 };
 
 struct LocalTreesView;  // accel/local_trees.h

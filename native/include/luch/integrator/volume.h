@@ -181,7 +181,7 @@ template <class Shader>
 LUCH_FN Color sampled_emission(const RenderView& scene, const PathState& path, u32 path_index, const LightSample& s,
                                float footprint, Shader& shader, ShadePoints& points) {
     ConstantEmission constant = emission_of(scene, s);
-    if (constant.constant) return constant.radiance;
+    if (!plan::SAMPLED_PROGRAMS || constant.constant) return constant.radiance;
     points.count = 1;
     setup_light_lane(scene, path, path_index, s, footprint, points, 0);
     return shader.light(program_of(scene, s), points).emission;

@@ -75,6 +75,7 @@ enum ProgramFlag : u32 {
     PROGRAM_EMISSION_FRONT = 64u,   // emits only where the front face is seen
     PROGRAM_EMISSION_BACK = 128u,
     PROGRAM_SUBSURFACE = 256u,      // may scatter light under the surface
+    PROGRAM_EMISSION_BY_SIDE = 4096u,  // emission is the same everywhere on a side
     PROGRAM_SUBSURFACE_BUMP = 512u, // whose normal is not the interpolated one
 };
 
