@@ -16,7 +16,6 @@ not correlated by it.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -34,10 +33,6 @@ GUIDE_RADIUS = 2  # pixels; how far neighbours may lie that say how bright the t
 SURE = 0.25  # of a neighbour's brightness: deviations below tell that it is there
 EDGE_GAP = 4.0  # times as bright as its surroundings: a pixel that may lie on a bright neighbour's edge
 GAP_VARIANCES = 4.0  # a gap of two standard deviations to the neighbours may still be noise
-BAND, HALO = (
-    64,
-    POOL_RADIUS + GUIDE_RADIUS,
-)  # rows worked on together, small enough for a cache; rows they look at beside
 TILE = 16  # pixels; edge of the tiles whose sums of deviations are taken as independent
 FIREFLIES = 0.001  # share of the pixels that are asked for their share of the error
 
@@ -133,21 +128,11 @@ def _truth_guesses(mean: F32, d: F64, known: F64) -> list[F32]:
     lit = box_sum((grey * grey).astype(np.float64))
     relative = np.divide(box_sum(noise.astype(np.float64)), lit, out=np.zeros_like(lit), where=lit > 0.0)
     noise = GAP_VARIANCES * np.maximum(noise, relative.astype(np.float32) * grey * grey)
+    from luch._native import core  # not needed by those who only read numbers
+
     beside = _beside_bright(grey, np.abs(d).mean(axis=2).astype(np.float32))
-    total, weights = np.zeros_like(mean), np.zeros_like(grey)
-    height, width = grey.shape
-    guesses = []
-    for radius in range(1, GUIDE_RADIUS + 1):
-        for dy, dx in _ring(radius):
-            here = slice(max(0, -dy), max(0, height - dy)), slice(max(0, -dx), max(0, width - dx))
-            there = slice(max(0, dy), max(0, height + dy)), slice(max(0, dx), max(0, width + dx))
-            alike = ((grey[here] - grey[there]) ** 2 <= noise[here] + noise[there]) & (known[there][..., 0] > 0.0)
-            weights[here] += alike
-            total[here] += alike[..., None] * mean[there]
-        guess = np.where(weights[..., None] > 0.5, total / np.maximum(weights, 1.0)[..., None], mean)
-        edge = beside[..., None] & (mean > EDGE_GAP * guess)
-        guesses.append(np.where(edge, mean, guess))
-    return guesses
+    guesses = core.film.guess_truth(mean, grey, noise, known[..., 0] > 0.0, beside, GUIDE_RADIUS, EDGE_GAP)
+    return list(guesses)
 
 
 def _beside_bright(grey: F32, deviation: F32) -> NDArray[np.bool_]:
@@ -181,16 +166,8 @@ def relative_deviations(mean: F32, deviation: F32) -> list[F64]:
     # Squares of floats stay floats: no colour above 1.
     unit = max(float(np.abs(mean).max()), float(np.finfo(np.float32).tiny))
 
-    def of_band(first: int) -> list[F64]:
-        """The same for some rows, with all the rows around them that they look at."""
-        above = min(first, HALO)
-        rows, around = slice(first, first + BAND), slice(first - above, first + BAND + HALO)
-        guesses = _truth_guesses(mean[around] / np.float32(unit), d[around] / unit, known[around])
-        return [d[rows] / (np.abs(truth[above : above + BAND]).astype(np.float64) * unit + DARK) for truth in guesses]
-
-    with ThreadPoolExecutor() as pool:  # NumPy lets go of the interpreter's lock
-        bands = list(pool.map(of_band, range(0, len(d), BAND)))
-    return [np.concatenate(parts) for parts in zip(*bands, strict=True)]
+    guesses = _truth_guesses(mean / np.float32(unit), d / unit, known)
+    return [d / (np.abs(truth).astype(np.float64) * unit + DARK) for truth in guesses]
 
 
 def _square(deviation: F64) -> F64:

@@ -32,7 +32,7 @@ STEP_SECONDS = 4.0
 # The error is looked at where that takes at most this share of the time so far: of all time 2 %, as looks lie a third
 # to a half apart. A look takes about so many seconds a pixel on one processor of 2024, until one was measured.
 LOOK_SHARE = 0.007
-LOOK_SECONDS = 1.2e-6
+LOOK_SECONDS = 0.7e-6
 QUICK_LOOK_SECONDS = 0.02  # taken however short the render, where an error is asked for
 # What reading passes takes at the end of a render that may only take so long; seconds a pixel and channel.
 PASS_SECONDS = 4e-9

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from luch import accuracy
+from luch._native import core
 from luch.scene import F32
 
 SIZE = 40
@@ -130,3 +131,27 @@ def test_parts_of_one_sequence_overstate_by_their_rate() -> None:
     assert accuracy.overstated(0.5, 1.1) == pytest.approx(2.0**1.1 - 1.0)
     assert accuracy.overstated(0.3, 1.2) == pytest.approx(accuracy.overstated(0.7, 1.2))
     assert accuracy.overstated(0.0, 1.2) == 1.0  # independent parts
+
+
+def test_guesses_at_the_truth_are_means_of_neighbours_that_noise_may_explain() -> None:
+    """The core's loops against the rule spelled out, pixel by pixel."""
+    rng = np.random.default_rng(6)
+    height, width, gap = 9, 7, 3.0
+    mean = rng.gamma(1.0, 1.0, (height, width, 3)).astype(np.float32)
+    grey, noise = mean.mean(axis=2), rng.gamma(1.0, 0.2, (height, width)).astype(np.float32)
+    known, beside = rng.random((2, height, width)) > 0.3
+    for radius, guess in enumerate(core.film.guess_truth(mean, grey, noise, known, beside, 2, gap), start=1):
+        for y in range(height):
+            for x in range(width):
+                around = [
+                    mean[v, u]
+                    for v in range(max(0, y - radius), min(height, y + radius + 1))
+                    for u in range(max(0, x - radius), min(width, x + radius + 1))
+                    if (v, u) != (y, x) and known[v, u]
+                    and (grey[y, x] - grey[v, u]) ** 2 <= noise[y, x] + noise[v, u]
+                ]  # fmt: skip
+                right = np.mean(around, axis=0) if around else mean[y, x]
+                right = np.where(beside[y, x] & (mean[y, x] > gap * right), mean[y, x], right)
+                np.testing.assert_allclose(guess[y, x], right, rtol=1e-5)
+    with pytest.raises(ValueError, match="one shape"):
+        core.film.guess_truth(mean, grey, noise[1:], known, beside, 2, gap)

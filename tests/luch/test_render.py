@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -128,3 +129,33 @@ def test_an_unknown_device_is_refused_by_name() -> None:
     scene = heavy_scene(100)
     with pytest.raises(ValueError, match="'TPU'; it can be CPU or CUDA"):
         render(replace(scene, settings=replace(scene.settings, device="TPU")))
+
+
+def test_a_time_limit_is_kept_with_building_and_reading_and_true_samples_are_told() -> None:
+    """Research on other engines: 4 to 21 % over the limit, and the number asked for written as the number taken."""
+    scene = heavy_scene(2_000)
+    scene.film.width = scene.film.height = 96
+    scene.film.passes = ["Combined", "Sample Count"]
+    scene.settings = replace(scene.settings, samples=1 << 20, time_limit=0.6)
+    began = time.perf_counter()
+    result = render(scene)
+    taken = time.perf_counter() - began
+    assert 0.3 < taken <= 0.6 + 0.25  # 50 ms is the goal of the bench; other tests run beside this one
+    counts = result.passes["Sample Count"]
+    assert result.stats["stopped_by"] == "time" and result.stats["samples"] < result.stats["samples_asked"] == 1 << 20
+    assert counts.min() >= result.stats["samples"] and counts.max() < 4 * result.stats["samples"]
+    assert result.stats["total_seconds"] == pytest.approx(taken, abs=0.1)
+
+
+def test_whatever_error_is_asked_for_a_render_ends() -> None:
+    scene = heavy_scene(50)
+    for settings in (
+        {"error_limit": 1e-9, "samples": 24},
+        {"error_limit": 1e-9, "samples": 1 << 20, "time_limit": 0.2},
+        {"error_limit": 0.5, "samples": 1 << 20},
+        {"error_limit": 0.5, "samples": 1},
+    ):
+        result = render(replace(scene, settings=replace(scene.settings, **settings)))
+        assert result.stats["stopped_by"] in ("samples", "time", "error")
+        if "error" in result.stats:  # never without its brightness: metrics alone reward what loses light
+            assert {"brightness", "brightness_low", "brightness_high", "fireflies_share"} <= set(result.stats)
