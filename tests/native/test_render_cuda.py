@@ -15,6 +15,7 @@ from luch.cuda import render as device_render
 from luch.render import Progress, render
 from luch.scene import Image, Instances, Material, Scene
 from luch.shader import ProgramBuilder
+from support.combinations import covering_rows, scene_of
 from support.cuda_on_cpu import FIBERS
 from support.devices import both, check_equal
 from support.effects import closure, program
@@ -198,3 +199,16 @@ def test_a_scene_that_does_not_fit_is_told_before_it_is_uploaded(place: str, mon
         device.DeviceError, match=r"The scene takes 0\.0 GiB of the GPU's memory, of which 0\.0 are free"
     ):
         render(checked())
+
+
+@pytest.mark.cuda
+@pytest.mark.parametrize("effects", covering_rows(), ids=lambda row: f"{len(row)} effects")
+def test_kernels_of_any_two_effects_draw_what_general_ones_do(place: str, effects: tuple[str, ...]) -> None:
+    """On a GPU alone: fibers would be compiled for a quarter of an hour."""
+    if place == FIBERS:
+        pytest.skip("on a GPU alone")
+    scene = scene_of(effects)
+    lean = render(replace(scene, settings=replace(scene.settings, device="CUDA")))
+    full = render(replace(scene, settings=replace(scene.settings, device="CUDA", force_effects=["ALL"])))
+    for name, image in lean.passes.items():
+        assert np.array_equal(image.view(np.uint32), full.passes[name].view(np.uint32)), name
