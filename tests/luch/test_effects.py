@@ -117,6 +117,19 @@ def test_subsurface_is_on_where_it_has_a_weight_and_a_radius() -> None:
         assert effect.reason.startswith("no material scatters light under its surface")
 
 
+def test_subsurface_on_spheres_is_named_as_not_supported() -> None:
+    inputs = {"color": ONE, "radius": (0.1,) * 3, "ior": 1.4}
+    subject = scene(lambda b: closure(b, "CLOSURE_SUBSURFACE", inputs, params=(1, 0)))
+    subject.meshes[0].spheres = np.ones((5, 4), np.float32)
+    effects = effects_of(subject)
+    assert effects["subsurface"].on
+    assert effects["subsurface of points"].state == "not yet"
+    assert effects["subsurface of points"].reason.endswith("diffuse on the spheres of point clouds")
+    subject.meshes[0].triangles = subject.meshes[0].triangles[:0]
+    subject.meshes[0].material_slots = subject.meshes[0].material_slots[:0]
+    assert effects_of(subject)["subsurface"].state == "off"
+
+
 def test_a_subsurface_node_is_told_unless_its_radius_is_zero() -> None:
     for radius, on in ((0.01, True), (0.0, False)):
         inputs = {"color": ONE, "radius": (radius,) * 3, "ior": 1.4}

@@ -1,4 +1,5 @@
-// Walks under surfaces: threads that end one take the next, since some take hundreds of steps. No shader program runs.
+// Under surfaces: walks, whose threads take the next as they end one, since some take hundreds of steps; and probes. No
+// shader program runs.
 #include "luch/accel/local_trees.h"
 #include "luch/integrator/wavefront.h"
 
@@ -7,6 +8,7 @@
 namespace luch {
 
 inline constexpr int WALK_BLOCK = 128;  // threads; luch/cuda/render.py launches as many
+inline constexpr int WALK_RESIDENT = 4;  // blocks a multiprocessor holds: 128 registers a thread
 
 struct LocalTracer {
     const LocalTreesView& trees;
@@ -25,7 +27,7 @@ __device__ __forceinline__ void store_end(SubsurfaceWalk* to, const SubsurfaceWa
 
 }  // namespace luch
 
-extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK)
+extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK, luch::WALK_RESIDENT)
     walk_subsurface(const __grid_constant__ luch::RenderTask task) {
     using namespace luch;
     const Wavefront& wave = task.wave;
@@ -40,12 +42,8 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK)
         if (!walking) {
             at = atomicAdd(wave.counters + WAVE_WALKED, 1u);
             if (at >= count) break;
+            if (wave.walks[at].probe) continue;
             walk = wave.walks[at];
-            if (walk.probe) {
-                probe_disk(task.scene.view, walk, tracer, &steps);
-                store_end(wave.walks + at, walk, WalkFate::LEAVES);
-                continue;
-            }
             plan = begin_walk(walk);
             walking = true;
         }
@@ -55,4 +53,19 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK)
         if (!walking) store_end(wave.walks + at, walk, fate);
     }
     if (steps != 0) atomicAdd(wave.totals + TOTAL_WALK_STEPS, steps);
+}
+
+// Those that probe a profile instead: one thread each.
+extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK)
+    probe_profiles(const __grid_constant__ luch::RenderTask task) {
+    using namespace luch;
+    const Wavefront& wave = task.wave;
+    u32 k = blockIdx.x * blockDim.x + threadIdx.x;
+    if (k >= wave.counters[WAVE_WALKS] || !wave.walks[k].probe) return;
+    SubsurfaceWalk walk = wave.walks[k];
+    LocalTracer tracer{*task.scene.local_trees};
+    u64 rays = 0;
+    probe_disk(task.scene.view, walk, tracer, &rays);
+    store_end(wave.walks + k, walk, WalkFate::LEAVES);
+    atomicAdd(wave.totals + TOTAL_WALK_STEPS, rays);
 }

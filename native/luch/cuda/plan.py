@@ -33,7 +33,6 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "FILTER_GLOSSY": ("filter glossy",),
     "HOLDOUT": ("holdout",),
     "CLAMPING": ("clamping",),
-    "SUBSURFACE": ("subsurface",),
     "VOLUMES": ("volumes",),
 }  # fmt: skip
 # Define -> what the core says of the scene as it will be rendered (core.render.Renderer.device_facts).
@@ -47,6 +46,7 @@ TOLD = {
 MADE_BY: dict[str, tuple[str, ...]] = {
     "TOON": ("CLOSURE_TOON",),
     "ASHIKHMIN_SHIRLEY": ("CLOSURE_GLOSSY",),
+    "SUBSURFACE": ("CLOSURE_SUBSURFACE", "CLOSURE_PRINCIPLED_SUBSURFACE"),
     "MICROFACETS": (
         "CLOSURE_GLOSSY",
         "CLOSURE_METALLIC",

@@ -354,6 +354,7 @@ class DeviceRenderer:
         if self._walks is not None and (walks := memory.count("walks")):
             kernel = self._walks.kernel("walk_subsurface")
             kernel.launch(min(kernel.resident_blocks(BLOCK), -(-walks // BLOCK)), BLOCK, [memory.tasks[turn]])
+            self._launch(self._walks.kernel("probe_profiles"), turn, walks)
             self._launch(stages.kernel("shade_exits"), turn, walks)
         shadows = memory.count("shadows")
         if shadows:

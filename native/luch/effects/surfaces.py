@@ -113,6 +113,13 @@ def _add_subsurface(effects: Effects, shown: Shown) -> None:
         return
     cost = "such a path goes on inside, by some tens of rays, and the objects have one tree more"
     add_trait(effects, "Surfaces", "subsurface", "subsurface", shown, off, cost=cost)
+    found = [surface for surface in shown.surfaces if "subsurface" in surface.traits]
+    points = [surface for surface in found if surface.spheres]
+    if points:
+        reason = f"{facts(points, 'subsurface')}: diffuse on the spheres of point clouds"
+        effects.add("Surfaces", "subsurface of points", False, reason, missing=True)
+    if found and len(points) == len(found) and not any(surface.triangles for surface in found):
+        effects.add("Surfaces", "subsurface", False, "it is on point clouds alone, which show it as diffuse")
 
 
 def _add_holdout(effects: Effects, shown: Shown) -> None:
