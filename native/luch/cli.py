@@ -156,7 +156,7 @@ def _render(options: argparse.Namespace) -> int:
 
 def _merge(options: argparse.Namespace) -> int:
     from luch import image, merge, record
-    from luch.render import ERROR_PASS, error_pass
+    from luch.render import ERROR_PASS
 
     if options.output.suffix.lower() != ".exr":
         raise ValueError(f"{options.output}: the name must end in .exr")
@@ -167,7 +167,7 @@ def _merge(options: argparse.Namespace) -> int:
     stats: dict[str, Any] = {"samples": whole.samples, "stopped_by": "merged", "merged": len(parts)}
     if found is not None:
         stats |= found.statistics()
-        passes[ERROR_PASS] = error_pass(film.deviations()[1])
+        passes[ERROR_PASS] = whole.error_pass()
     stats["render_seconds"] = sum(float(header.get("luch.render_seconds", 0.0)) for header in headers)
     kept = {key: value for key, value in headers[0].items() if key.startswith("cryptomatte/") or key == "luch.scene"}
     metadata = {**kept, **record.header_fields(stats)}

@@ -125,13 +125,18 @@ class Curve:
         return told
 
 
+def correction(share: float, rate: float) -> float:
+    """What to multiply errors by that parts of one sequence tell."""
+    return float(overstated(share, max(1.0, rate)) ** -0.5)
+
+
 def corrected(told: Estimate, share: float, rate: float, spread: float) -> Estimate:
     """What parts of one sequence overstate taken out (share 0: they are independent). The logarithm of the correction is as uncertain as the rate makes it."""
     rate = max(1.0, rate)
     by = overstated(share, rate)
     step = 0.01
     slope = 0.5 * float(np.log(overstated(share, rate + step) / by)) / step
-    return told.scaled(by**-0.5, slope * spread)
+    return told.scaled(correction(share, rate), slope * spread)
 
 
 def next_target(error: float) -> float:

@@ -18,8 +18,8 @@ from luch.scene import F32
 
 # CLAMPED_UNIT and CUT_UNIT of luch/film/film.h.
 CLAMPED_UNIT, CUT_UNIT = 2.0**-16, 2.0**-20
-# Below a hundred thousandth nothing is said.
-LEAST_SHARE = 1e-5
+# Below a ten thousandth nothing is said.
+LEAST_SHARE = 1e-4
 
 
 def shares(stats: Mapping[str, Any], combined: F32, exposure: float) -> dict[str, float]:

@@ -60,6 +60,13 @@ class Sums:
         found = accuracy.estimate(mean, deviation)
         return found and curve.corrected(found, 0.0 if self.independent else share, *self.rate)
 
+    def error_pass(self) -> F32:
+        """The standard error of Combined, (H, W, 3)."""
+        from luch.render import error_pass
+
+        _, deviation, share = self.native().deviations()
+        return error_pass(deviation, 0.0 if self.independent else share, self.rate[0])
+
     def layers(self) -> dict[str, F32]:
         """As images of a file, beside the passes."""
         x0, y0, x1, y1 = self.film.border or (0, 0, self.film.width, self.film.height)

@@ -19,7 +19,7 @@ import numpy as np
 
 from luch import accuracy, ledger
 from luch._native import core
-from luch.curve import Curve, Forecast, next_target
+from luch.curve import Curve, Forecast, correction, next_target
 from luch.effects import effects_of
 from luch.effects.removal import without
 from luch.merge import Sums
@@ -237,9 +237,9 @@ class _Loop:
         return "error" if self.stopping.reached else "time" if self.timed_out else "samples"
 
 
-def error_pass(deviation: F32) -> F32:
-    """From a film's deviations."""
-    error = accuracy.standard_error(deviation)
+def error_pass(deviation: F32, share: float, rate: float) -> F32:
+    """From a film's deviations and the rate that luch.curve found; share 0: of independent parts."""
+    error = accuracy.standard_error(deviation, correction(share, rate))
     return np.where(np.isfinite(error), error, UNKNOWN_ERROR)
 
 
@@ -289,7 +289,8 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     stats.update(ledger.shares(stats, passes["Combined"], scene.film.exposure))
     stats.update(loop.curve.statistics())
     if wants_error:
-        passes[ERROR_PASS] = error_pass(renderer.deviations()[1])
+        _, deviation, share = renderer.deviations()
+        passes[ERROR_PASS] = error_pass(deviation, share, loop.curve.rate()[0])
     stats["total_seconds"] = time.perf_counter() - start
     sums = None
     if settings.mergeable:

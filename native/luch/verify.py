@@ -15,7 +15,7 @@ import numpy as np
 
 from luch import ledger, merge
 from luch.accuracy import NORMAL_95
-from luch.render import ERROR_PASS, Progress, Result, error_pass, render
+from luch.render import ERROR_PASS, Progress, Result, render
 from luch.scene import Scene
 
 # An error told within this factor is right, however narrow the intervals: relMSE within 0.8..1.25.
@@ -49,7 +49,7 @@ def _merged(scene: Scene, halves: list[Result]) -> Result:
     film = sums.native()
     passes = dict(film.resolve())
     if ERROR_PASS in scene.film.passes:
-        passes[ERROR_PASS] = error_pass(film.deviations()[1])
+        passes[ERROR_PASS] = sums.error_pass()
     stats = dict(halves[0].stats)
     for key in (
         "paths",
