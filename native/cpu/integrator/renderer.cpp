@@ -276,8 +276,11 @@ void Renderer::build_lights() {
         if (scene_.view.materials[m].program.flags & PROGRAM_EMISSION) scene_.can_meet_light = true;
     }
     for (u32 m = 0; scene_.has_media && m < scene_.media.count; m++) {
-        if (!is_zero(scene_.media.media[m].emission)) scene_.can_meet_light = true;
+        if (is_zero(scene_.media.media[m].emission)) continue;
+        scene_.can_meet_light = true;
+        scene_.media.last_turn_matters = 1u;
     }
+    if (scene_.has_world && !lights.world.present) scene_.media.last_turn_matters = 1u;
 }
 
 bool Renderer::render(u32 first, u32 count) {

@@ -35,6 +35,7 @@ struct MediaView {
     u32 world;             // everywhere; NONE: nothing
     MediumStack camera;    // at camera_position
     Vec3 camera_position;  // world
+    u32 last_turn_matters; // 1: a path may meet light that is never sampled: an even world, a glowing medium
     u32 camera_walks;      // 1: on the way from there to where a camera's ray begins, there may be borders
 };
 

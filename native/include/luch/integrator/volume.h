@@ -250,6 +250,17 @@ LUCH_FN void count_volume_bounce(PathState& path, const PathLimits& limits) {
     path.visibility = RAY_VOLUME;
 }
 
+// With which probability a flight is free, to end where the medium has it; else it goes past all scattering. A path
+// that may turn but once more would find little there that lights, sampled, do not bring anyway: what lies behind
+// is worth more of the samples. 0: it could find nothing.
+inline constexpr float LAST_TURN_CHANCE = 0.25f;
+
+LUCH_FN float turning_chance(const RenderView& scene, const PathState& path) {
+    bool last = path.bounce + 1u >= scene.limits.bounces || path.volume_bounce + 1u >= scene.limits.volume;
+    if (!last || scene.media.last_turn_matters || gathers_features(path)) return 1.0f;
+    return scene.can_meet_light ? LAST_TURN_CHANCE : 0.0f;
+}
+
 enum class FlightEnd : u32 { AT_SURFACE, SCATTERED, LOST };
 
 // What a flight without scattering, or past all of it, leaves of the path.
@@ -303,16 +314,18 @@ LUCH_FN_SLOW FlightEnd fly(const RenderView& scene, FilmWriter& writer, PathStat
     if (!is_zero(flight.sum.emission)) add_medium_emission(scene, writer, path, stack, flight);
     if (!may_scatter(path, flight)) return dim_path(path, transmitted(extinction, flight.length));
     Vec2 u = sample_2d(path.sampler, path.dimension + FLIGHT_DISTANCE);
-    float chosen = pick_channel(flight.carried, extinction, u.y);
-    float t = chosen > 0.0f ? -log_f(1.0f - u.x) / chosen : INFINITE_DISTANCE;
+    float chance = turning_chance(scene, path), chosen = pick_channel(flight.carried, extinction, u.y);
+    bool free = u.x < chance && chosen > 0.0f;
+    float t = free ? -log_f(1.0f - min_f(u.x / chance, 0.99999994f)) / chosen : INFINITE_DISTANCE;
     FlightEnd end;
     if (t < flight.length) {
         Color through = transmitted(extinction, t);
-        float density = channel_sum(flight.carried * extinction * through);
+        float density = chance * channel_sum(flight.carried * extinction * through);
         end = scatter_path(scene, writer, path, stack, ray, flight, t, through * safe_divide(1.0f, density), next);
     } else {
         Color through = transmitted(extinction, flight.length);
-        end = dim_path(path, through * safe_divide(1.0f, channel_sum(flight.carried * through)));
+        float probability = chance * channel_sum(flight.carried * through) + (1.0f - chance);
+        end = dim_path(path, through * safe_divide(1.0f, probability));
     }
     path.dimension += DIMENSIONS_PER_FLIGHT;
     return end;
