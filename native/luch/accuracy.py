@@ -7,7 +7,7 @@ sampler and any distribution; they would differ by ab. A path that only one part
 error made of a few bright pixels is told well, though the next picture's may be another. Parts of one sequence
 complement each other, so that d^2 is larger than the squared error by what `overstated` says; luch.curve takes that
 out with the rate that it finds. Two sequences scrambled apart would need no correction, but each would be worth less:
-measured, relMSE 4 to 10 % higher in a closed room and up to twice where edges decide (docs/accuracy.md).
+measured, relMSE 4 to 10 % higher in a closed room, 1.6 to 3.4 times at 16 samples where edges decide (docs/accuracy.md).
 
 The measure: relMSE = mean((I - R)^2 / (|R| + 0.01)^2) over pixels and channels (Rousselle et al. 2011), R the truth;
 its square root is "the error". Samples are drawn by the pixel filter and count for one pixel alone, so neighbours are
