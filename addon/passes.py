@@ -45,6 +45,13 @@ TABLE = (
     RenderPass("Error", "RGB", "COLOR", "luch.use_pass_error"),
 )
 
+# Passes of Cycles that guide its own sampling of volumes: nothing that Luch has.
+NOT_RENDERED = {
+    "Volume Scatter": "cycles.use_pass_volume_scatter",
+    "Volume Transmit": "cycles.use_pass_volume_transmit",
+    "Volume Majorant": "cycles.use_pass_volume_majorant",
+}
+
 # What Luch's own switches mean in files that were set up for Cycles.
 CYCLES_SWITCHES = {
     "luch.use_pass_denoising": "cycles.denoising_store_passes",
@@ -99,6 +106,11 @@ def enabled_passes(view_layer: Any) -> Iterator[RenderPass]:
         yield RenderPass(aov.name, "X", "VALUE") if aov.type == "VALUE" else RenderPass(aov.name, "RGBA", "COLOR")
     for group in view_layer.lightgroups:
         yield RenderPass(f"Combined_{group.name}", "RGB", "COLOR")
+
+
+def missing_passes(view_layer: Any) -> list[str]:
+    """Names of passes that the view layer asks for and Luch does not render."""
+    return [name for name, switch in NOT_RENDERED.items() if _switched_on(view_layer, switch)]
 
 
 def register_passes(engine: Any, scene: Any, view_layer: Any) -> None:

@@ -19,6 +19,8 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
     aovs, unnamed = passes.enabled_aovs(view_layer)
     for name in unnamed:
         context.warn(f'View layer "{view_layer.name}": AOV "{name}" has the name of another pass. Rename it.')
+    for name in passes.missing_passes(view_layer):
+        context.warn(f'View layer "{view_layer.name}": pass "{name}" is Cycles\' own; Luch does not render it.')
     scale = render.resolution_percentage / 100.0
     width, height = size or (int(render.resolution_x * scale), int(render.resolution_y * scale))
     film = Film(

@@ -221,6 +221,12 @@ def test_a_volume_that_changes_from_place_to_place_is_named_and_left_out(scene: 
     assert 'Material "Volume": node "Volume Scatter" changes from place to place' in told
 
 
+def test_passes_about_cycles_own_sampling_are_named(scene: bpy.types.Scene) -> None:
+    stage(scene)
+    scene.view_layers[0].cycles.use_pass_volume_majorant = True
+    assert any('pass "Volume Majorant"' in warning for warning in exported().warnings)
+
+
 def test_numbers_that_nodes_compute_make_an_even_volume(scene: bpy.types.Scene) -> None:
     stage(scene)
     material = volume(ABSORPTION, Color=(0.0, 0.0, 0.0, 1.0))
