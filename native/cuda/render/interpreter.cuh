@@ -4,7 +4,7 @@
 
 namespace luch {
 
-// Registers of a program's interpreter, in local memory; luch/cuda/render.py refuses a general kernel for more.
+// Registers of a program's interpreter, in local memory; luch/cuda/scene_kernels.py refuses a general kernel for more.
 inline constexpr u32 INTERPRETER_REGISTERS = 256;
 
 template <class Op>

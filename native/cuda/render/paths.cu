@@ -1,12 +1,10 @@
 // The stages that run no shader program: beginning paths, sorting hits by material, passing on to the next round.
 #include "luch/integrator/camera_path.h"
 #include "luch/integrator/wavefront.h"
+#include "render/launch.cuh"
 
 namespace luch {
-inline constexpr int STAGE_BLOCK = 128;    // threads; luch/cuda/render.py launches as many
 inline constexpr u32 COUNTED_IN_BLOCK = 1024;  // materials whose counts a block keeps in shared memory
-
-__device__ __forceinline__ u32 stage_index() { return blockIdx.x * blockDim.x + threadIdx.x; }
 
 __device__ __forceinline__ u32 material_of(const RenderTask& task, u32 k) {
     const Hit& hit = task.wave.hits[k];

@@ -1,13 +1,10 @@
 // What the stages of the wavefront share: who a thread is, appending to queues, a program at one point.
 #pragma once
 #include "luch/integrator/wavefront.h"
+#include "render/launch.cuh"
 #include "render/programs.cuh"
 
 namespace luch {
-
-inline constexpr int STAGE_BLOCK = 128;  // threads; luch/cuda/render.py launches as many
-
-__device__ __forceinline__ u32 stage_index() { return blockIdx.x * blockDim.x + threadIdx.x; }
 
 // A place at the end of a queue; which one is a matter of chance, and nothing depends on it.
 __device__ __forceinline__ u32 append(const Wavefront& wave, WaveCounter queue) {
