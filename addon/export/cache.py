@@ -32,6 +32,10 @@ class MeshCache:
         self._generation = 0
         self.read_count = 0  # meshes copied out of Blender so far
 
+    def clear(self) -> None:
+        """Forget everything."""
+        self._entries.clear()
+
     def begin(self, depsgraph: Any) -> None:
         """Start a frame: forget what changed and what the last frame did not use."""
         changed = {update.id.original.session_uid for update in depsgraph.updates if update.is_updated_geometry}

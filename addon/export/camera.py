@@ -22,7 +22,7 @@ def export_camera(subject: Any, context: ExportContext, engine: Any) -> Camera:
     data: Any = subject.data
     camera = Camera(
         kind=_kind(data, context),
-        matrix=_rigid(np.array(subject.matrix_world, dtype=np.float64))[:3],
+        matrix=camera_matrix(subject),
         lens_mm=data.lens,
         sensor_width_mm=data.sensor_width,
         sensor_height_mm=data.sensor_height,
@@ -47,6 +47,11 @@ def _kind(data: Any, context: ExportContext) -> str:
     name = data.panorama_type if data.type == "PANO" else data.type
     context.warn(f'Camera "{data.name}": type {name} is not supported and drawn as perspective.')
     return "PERSP"
+
+
+def camera_matrix(subject: Any) -> F64:
+    """Camera to world, (3, 4), of an evaluated camera."""
+    return _rigid(np.array(subject.matrix_world, dtype=np.float64))[:3]
 
 
 def _rigid(matrix: F64) -> F64:

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 from luch.scene import Instances, Mesh, Object
+from numpy.typing import NDArray
 
 from .cache import MeshCache
 from .context import ExportContext
 from .derived import object_attributes
 from .lights import export_light
 from .materials import MaterialTable
+from .motion import MotionRecorder
 from .visibility import instance_visibility
 from .volumes import warn_about_smoke
 
@@ -27,19 +29,27 @@ NO_INSTANCER_GENERATED = (1.0, 1.0, 1.0)  # an orco of 1 gives generated 0
 NO_INSTANCER_UV = (0.0, 0.0)
 
 
-def export_instances(context: ExportContext, cache: MeshCache) -> None:
-    """Fill meshes, objects, instances, materials and lamps of the scene. Each mesh is read once."""
-    collector = InstanceCollector(context, cache)
+def export_instances(
+    context: ExportContext, cache: MeshCache, recorder: MotionRecorder | None = None
+) -> InstanceCollector:
+    """Fill meshes, objects, instances, materials and lamps of the scene. Each mesh is read once.
+
+    recorder: takes note of every instance, where the shutter is open for a time.
+    """
+    collector = InstanceCollector(context, cache, recorder)
     for item in context.depsgraph.object_instances:
         if item.show_self:
             collector.add(item)
     collector.finish()
+    return collector
 
 
 class InstanceCollector:
     """Rows of `Scene.instances` as they come out of Blender's iterator."""
 
-    def __init__(self, context: ExportContext, cache: MeshCache) -> None:
+    def __init__(self, context: ExportContext, cache: MeshCache, recorder: MotionRecorder | None = None) -> None:
+        self.kept: NDArray[np.bool_] = np.zeros(0, np.bool_)  # of all rows, those that became instances
+        self._recorder = recorder
         self._context = context
         self._cache = cache
         self._materials = MaterialTable(context)
@@ -95,7 +105,7 @@ class InstanceCollector:
     def finish(self) -> None:
         """Turn the columns into arrays."""
         matrix = np.frombuffer(b"".join(self._matrices), dtype=np.float32).reshape(-1, 4, 4)[:, :3].astype(np.float64)
-        finite = np.isfinite(matrix).all(axis=(1, 2))
+        self.kept = finite = np.isfinite(matrix).all(axis=(1, 2))
         if not finite.all():
             index = self._object_column[int(np.argmin(finite))]
             name = self._context.result.objects[index].name
@@ -122,6 +132,9 @@ class InstanceCollector:
             index = self._objects[key] = self._add_object(subject, parent)
         if index == NO_OBJECT:
             return
+        if self._recorder is not None:
+            mesh = self._context.result.objects[index].mesh
+            self._recorder.note(item, subject, parent, len(self._object_column), mesh)
         self._object_column.append(index)
         # Vectors of the iterator point into it: only copies may be kept.
         self._matrices.append(bytes(item.matrix_world))

@@ -23,7 +23,7 @@ def export_mesh(mesh: Any, wanted: set[str], undeformed: Any, context: ExportCon
     count = len(mesh.loop_triangles)
     if count == 0:
         return None
-    corners = _triangle_corners(mesh, count)
+    corners = triangle_corners(mesh, count)
     corner_vertices = read(mesh.attributes[".corner_vert"].data, "value", len(mesh.loops), np.int32)
     positions = read(mesh.attributes["position"].data, "vector", 3 * len(mesh.vertices), np.float32).reshape(-1, 3)
     faces = read(mesh.loop_triangle_polygons, "value", count, np.int32)
@@ -36,12 +36,12 @@ def export_mesh(mesh: Any, wanted: set[str], undeformed: Any, context: ExportCon
         texture_location=tuple(mesh.texspace_location),
         texture_size=tuple(mesh.texspace_size),
     )
-    _add_normals(result, mesh, corners, faces)
+    add_normals(result, mesh, corners, faces)
     add_attributes(result, mesh, wanted, corners, faces, undeformed, context)
     return _without_invalid(result, context)
 
 
-def _triangle_corners(mesh: Any, count: int) -> I32:
+def triangle_corners(mesh: Any, count: int) -> I32:
     """The three corners of every triangle, int32 (3T,).
 
     Blender keeps them as one array, and the address of the first triangle is that array's; reading it costs 1 ms a
@@ -67,7 +67,7 @@ def _material_slots(mesh: Any, faces: I32) -> NDArray[np.uint16]:
     return limited[faces]
 
 
-def _add_normals(result: Mesh, mesh: Any, corners: I32, faces: I32) -> None:
+def add_normals(result: Mesh, mesh: Any, corners: I32, faces: I32) -> None:
     """Unit normals where Blender shades smooth; flat faces keep their triangles' own normals."""
     domain = mesh.normals_domain
     if domain == "POINT":

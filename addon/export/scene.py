@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from luch.scene import Scene
+from luch.scene import Scene, Shutter
 
 from .cache import MeshCache
-from .camera import export_camera
+from .camera import camera_matrix, export_camera
 from .context import ExportContext
 from .film import export_film
 from .instances import export_instances
+from .motion import MotionRecorder, export_shutter
 from .settings import export_settings
 from .world import export_world
 
@@ -36,18 +37,36 @@ def export_scene(
     result.film = export_film(context, (engine.resolution_x, engine.resolution_y) if engine else None)
     result.settings = export_settings(context)
     result.world = export_world(context)
-    export_instances(context, cache)
+    shutter = export_shutter(context, engine)
+    if shutter is None:
+        export_instances(context, cache)
+    else:
+        _export_motion(context, cache, engine, shutter)
     result.origin = _origin(result)
     return result
+
+
+def _export_motion(context: ExportContext, cache: MeshCache, engine: Any, shutter: Shutter) -> None:
+    """Everything as it is in the shutter's middle, and what moves at other times."""
+    recorder = MotionRecorder(context, engine, shutter)
+    # Evaluating another time gives meshes new addresses, and old ones to others: nothing may be kept by them.
+    cache.clear()
+    try:
+        with recorder.at_middle():
+            collector = export_instances(context, cache, recorder)
+            recorder.follow(context.result.camera, lambda: _camera(context, engine), camera_matrix)
+    finally:
+        cache.clear()
+    recorder.finish(collector.kept)
 
 
 def _warn_about_what_is_missing(context: ExportContext) -> None:
     """Say which settings of the scene change nothing yet."""
     render = context.scene.render
-    if render.use_motion_blur and context.view_layer.use_motion_blur:
+    if context.view_layer.use_pass_vector:
         context.warn(
-            f'Scene "{context.scene.name}" has motion blur, which Luch does not draw yet: the frame is sharp.',
-            "motion blur",
+            f'View layer "{context.view_layer.name}" asks for the pass Vector, which Luch does not write: motion blur'
+            " takes its place."
         )
     if render.use_multiview:
         context.warn(

@@ -46,9 +46,9 @@ class ArrayAccel {
                 std::vector<u8> blocked(end - begin);
                 Counters kept;
                 if (any_hit)
-                    accel_->any(in + begin, nullptr, blocked.data(), end - begin, &kept);
+                    accel_->any(in + begin, nullptr, blocked.data(), end - begin, nullptr, &kept);
                 else
-                    accel_->closest(in + begin, nullptr, hits.data(), end - begin, &kept);
+                    accel_->closest(in + begin, nullptr, hits.data(), end - begin, nullptr, &kept);
                 std::lock_guard guard(lock);
                 total.add(kept);
             });

@@ -10,6 +10,7 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_light(m);
     luch::bindings::bind_math(m);
     luch::bindings::bind_media(m);
+    luch::bindings::bind_motion(m);
     luch::bindings::bind_render(m);
     luch::bindings::bind_sampling(m);
     luch::bindings::bind_shade(m);

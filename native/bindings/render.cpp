@@ -92,6 +92,8 @@ class PyRenderer {
         facts["visible_lamps"] = scene.has_visible_lamps;
         facts["world_program"] = scene.has_world && !scene.world_emission.constant;
         facts["one_group"] = renderer_->trees().is_one_group();
+        facts["moves"] = scene.shutter != nullptr;
+        facts["trees_move"] = renderer_->trees().moves();
         return facts;
     }
 
@@ -122,6 +124,7 @@ class PyRenderer {
         d["scene_bytes"] = s.scene_bytes;
         d["film_pixel_bytes"] = s.film_pixel_bytes;
         d["lens_samples"] = s.counts.lens_samples;
+        d["time_samples"] = s.counts.time_samples;
         d["lamp_searches"] = s.counts.lamp_searches;
         d["transparent_steps"] = s.counts.transparent_steps;
         d["world_points"] = s.counts.world_points;
@@ -168,6 +171,9 @@ py::dict task_fields() {
     LUCH_FIELD(wave.shadow_media);
     LUCH_FIELD(wave.counters);
     LUCH_FIELD(wave.totals);
+    LUCH_FIELD(wave.ray_time);
+    LUCH_FIELD(wave.next_time);
+    LUCH_FIELD(wave.shadow_time);
     LUCH_FIELD(film.layout.stride);
     LUCH_FIELD(film.layout.marks);
     LUCH_FIELD(film.layout.aov_count);

@@ -2,6 +2,7 @@
 
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <stdexcept>
@@ -124,6 +125,7 @@ struct Reader {
             a.domain = read_domain(py::cast<std::string>(attribute.attr("domain")));
             in.attributes.push_back(a);
         }
+        read_mesh_motion(mesh, keep, in);
         in.uv_active = py::cast<std::string>(mesh.attr("uv_active"));
         in.color_active = py::cast<std::string>(mesh.attr("color_active"));
         in.texture_location = read_color(mesh.attr("texture_location"));
@@ -142,6 +144,24 @@ struct Reader {
                                      py::cast<float>(phase.attr("a")), py::cast<float>(phase.attr("b"))});
         }
         return input.media.add(in);
+    }
+
+    bool still() const { return scene.attr("shutter").is_none(); }
+
+    void read_mesh_motion(const py::object& mesh, Keep& keep, cpu::MeshInput& in) {
+        if (still() || mesh.attr("motion_positions").is_none()) return;
+        auto positions = keep.array<float>(mesh.attr("motion_positions"));
+        if (positions.ndim() != 3 || positions.shape(0) < 2 || size_t(positions.shape(1)) != in.vertex_count ||
+            positions.shape(2) != 3)
+            throw std::invalid_argument("Mesh \"" + in.name + "\": motion_positions must be (K, V, 3), K at least 2.");
+        in.motion_keys = u32(positions.shape(0));
+        in.motion_positions = positions.data();
+        if (!in.normals) return;
+        size_t rows = in.normals_domain == Domain::POINT ? in.vertex_count : in.triangle_count * 3;
+        auto normals = keep.array<float>(mesh.attr("motion_normals"));
+        if (size_t(normals.size()) != in.motion_keys * rows * 3)
+            throw std::invalid_argument("Mesh \"" + in.name + "\": motion_normals do not fit motion_positions.");
+        in.motion_normals = normals.data();
     }
 
     void read_material(const py::object& material) {
@@ -191,6 +211,35 @@ struct Reader {
         store.add_object(in);
     }
 
+    cpu::Matrix relative_to_origin(const double* matrix) const {
+        cpu::Matrix m;
+        std::copy(matrix, matrix + 12, m.begin());
+        for (size_t row = 0; row < 3; row++) m[row * 4 + 3] -= input.origin[row];
+        return m;
+    }
+
+    // By instance, as InstanceInput::motion; none: nothing moves.
+    std::vector<std::vector<cpu::Matrix>> read_instance_motion(const py::object& motion, size_t instance_count) {
+        std::vector<std::vector<cpu::Matrix>> out;
+        if (still() || motion.is_none()) return out;
+        auto instance = py::cast<Array<u32>>(motion.attr("instance"));
+        auto keys = py::cast<Array<u32>>(motion.attr("keys"));
+        auto matrix = py::cast<Array<double>>(motion.attr("matrix"));
+        size_t moving = size_t(instance.size()), sum = 0;
+        for (size_t i = 0; i < size_t(keys.size()); i++) sum += keys.data()[i];
+        if (size_t(keys.size()) != moving || size_t(matrix.size()) != sum * 12)
+            throw std::invalid_argument("Instances: the arrays of their motion differ in length.");
+        out.resize(instance_count);
+        const double* next = matrix.data();
+        for (size_t i = 0; i < moving; i++) {
+            if (instance.data()[i] >= instance_count)
+                throw std::invalid_argument("Instances: their motion names one that is not there.");
+            for (u32 k = 0; k < keys.data()[i]; k++, next += 12)
+                out[instance.data()[i]].push_back(relative_to_origin(next));
+        }
+        return out;
+    }
+
     u64 read_instances(const py::object& instances) {
         if (instances.is_none()) return 0;
         auto object = py::cast<Array<u32>>(instances.attr("object"));
@@ -204,6 +253,7 @@ struct Reader {
             throw std::invalid_argument("Instances: the arrays differ in length.");
         }
         u64 dropped = 0;
+        std::vector<std::vector<cpu::Matrix>> motion = read_instance_motion(instances.attr("motion"), count);
         for (size_t i = 0; i < count; i++) {
             cpu::InstanceInput in{};
             in.object = object.data()[i];
@@ -212,6 +262,7 @@ struct Reader {
             in.random = random.data()[i];
             in.generated = {generated.data()[i * 3], generated.data()[i * 3 + 1], generated.data()[i * 3 + 2]};
             in.uv = {uv.data()[i * 2], uv.data()[i * 2 + 1]};
+            if (!motion.empty()) in.motion = std::move(motion[i]);
             if (!store.add_instance(in)) dropped++;
         }
         return dropped;
@@ -315,6 +366,39 @@ struct Reader {
                                                        : automatic_map_width(world.attr("program"));
     }
 
+    void read_camera_motion(const py::object& motion, cpu::CameraSpec spec, const cpu::FrameSpec& frame) {
+        if (still() || motion.is_none()) return;
+        auto matrix = py::cast<Array<double>>(motion.attr("matrix"));
+        if (matrix.size() % 12 != 0)
+            throw std::invalid_argument("Camera: the matrices of its motion must be (K, 3, 4).");
+        std::vector<cpu::Matrix> places;
+        for (py::ssize_t at = 0; at < matrix.size(); at += 12) {
+            std::copy(matrix.data() + at, matrix.data() + at + 12, spec.matrix);
+            CameraView view = cpu::make_camera_view(spec, frame, input.origin);
+            std::copy(std::begin(view.to_world.m), std::end(view.to_world.m), places.emplace_back().begin());
+        }
+        bool moves = std::any_of(places.begin(), places.end(), [&](const cpu::Matrix& m) { return m != places[0]; });
+        if (moves) input.motion.camera = cpu::make_keys(places);
+        if (motion.attr("lens_mm").is_none() || spec.kind != "PERSP") return;
+        auto lens = py::cast<std::array<double, 2>>(motion.attr("lens_mm"));
+        input.motion.zooms = lens[0] != spec.lens_mm || lens[1] != spec.lens_mm;
+        for (size_t end = 0; end < 2; end++) {
+            spec.lens_mm = lens[end];
+            input.motion.camera_ends[end] = cpu::make_camera_view(spec, frame, input.origin);
+        }
+    }
+
+    void read_shutter(const py::object& shutter) {
+        if (shutter.is_none()) return;
+        input.motion.shutter = true;
+        py::object curve = shutter.attr("curve");
+        if (!curve.is_none()) {
+            auto open = py::cast<Array<float>>(curve);
+            input.motion.curve.assign(open.data(), open.data() + open.size());
+        }
+        if (!shutter.attr("rolling").is_none()) input.motion.rolling = py::cast<float>(shutter.attr("rolling"));
+    }
+
     void read_camera(const py::object& camera, const py::object& film) {
         cpu::CameraSpec spec;
         auto number = [&](const char* name) { return py::cast<double>(camera.attr(name)); };
@@ -346,6 +430,7 @@ struct Reader {
         auto aspect = py::cast<std::array<double, 2>>(film.attr("pixel_aspect"));
         std::copy(aspect.begin(), aspect.end(), frame.pixel_aspect);
         input.camera = cpu::make_camera_view(spec, frame, input.origin);
+        read_camera_motion(camera.attr("motion"), spec, frame);
         input.frame_width = u32(frame.width);
         input.frame_height = u32(frame.height);
     }
@@ -444,6 +529,7 @@ ReadScene read_scene(const py::object& scene) {
     reader.read_film(film);
     reader.read_settings(scene.attr("settings"));
     reader.read_camera(scene.attr("camera"), film);
+    reader.read_shutter(scene.attr("shutter"));
     return out;
 }
 

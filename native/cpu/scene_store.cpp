@@ -163,6 +163,9 @@ void SceneStore::add_mesh(const MeshInput& input) {
         if (attribute.name == input.color_active) named_attributes_.push_back({index, view_.color_attribute, view});
     }
     meshes_.push_back(mesh);
+    if (input.motion_keys > 1)
+        motion_.add_mesh(index, mesh.vertex_count, u32(input.normals ? rows_of(input.normals_domain, input) : 0),
+                         input.motion_keys, input.motion_positions, input.normals ? input.motion_normals : nullptr);
 }
 
 u32 SceneStore::add_object(const ObjectInput& input) {
@@ -210,6 +213,7 @@ bool SceneStore::add_instance(const InstanceInput& input) {
     instance.generated = input.generated;
     instance.uv = input.uv;
     objects_[input.object].location = {float(m[3]), float(m[7]), float(m[11])};
+    motion_.add_instance(u32(instances_.size()), input.motion);
     instances_.push_back(instance);
     return true;
 }
@@ -243,6 +247,7 @@ void SceneStore::resolve_attributes() {
 
 const SceneView& SceneStore::finish() {
     resolve_attributes();
+    view_.motion = motion_.finish(meshes_.size(), instances_);
     blend_normals_in_world(meshes_, instances_, normals_);
     view_.positions = positions_.data();
     view_.triangles = triangles_.data();
@@ -309,6 +314,7 @@ void SceneStore::describe(DeviceImage& image, u32 block, const SceneView& view) 
         image.link(images, &images_[i].pixels, pixels);
     }
     programs_.describe(image, block, view);
+    motion_.describe(image, block, view);
 }
 
 size_t SceneStore::bytes() const {
@@ -316,6 +322,7 @@ size_t SceneStore::bytes() const {
         (positions_.size() + spheres_.size() + normals_.size() + attribute_data_.size() + triangles_.size()) * 4 +
         material_slots_.size() * 2 + instances_.size() * sizeof(InstanceView);
     for (const std::vector<u8>& pixels : pixels_) sum += pixels.size();
+    sum += motion_.bytes();
     return sum;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cpu/device_image.h"
+#include "cpu/motion/motion_store.h"
 #include "cpu/shade/link.h"
 #include "luch/shade/scene_view.h"
 
@@ -34,6 +35,9 @@ struct MeshInput {
     std::vector<AttributeInput> attributes;
     std::string uv_active, color_active;
     Vec3 texture_location, texture_size;
+    u32 motion_keys;              // 0: keeps its shape
+    const float* motion_positions;  // as positions and normals, key by key
+    const float* motion_normals;
 };
 
 struct ObjectInput {
@@ -55,6 +59,7 @@ struct InstanceInput {
     float random;
     Vec3 generated;
     Vec2 uv;
+    std::vector<Matrix> motion;  // as matrix, at evenly spaced times; none: stands still
 };
 
 class SceneStore {
@@ -97,6 +102,7 @@ class SceneStore {
     };
     SceneView view_{};
     LinkedPrograms programs_;
+    MotionStore motion_;
     std::vector<float> positions_, spheres_, normals_, attribute_data_;
     std::vector<u32> triangles_, material_table_;
     std::vector<u16> material_slots_;

@@ -49,6 +49,10 @@ class Mesh:
     texture_size: tuple[float, float, float] = (1.0, 1.0, 1.0)
     # (S, 4) centre and radius, as point clouds have them: only their outside is seen. A radius of 0 is not drawn.
     spheres: F32 | None = None
+    # Its shape while the shutter is open, at evenly spaced times; None: it keeps it. The fields above are those of the
+    # shutter's middle.
+    motion_positions: F32 | None = None  # (K, V, 3)
+    motion_normals: F32 | None = None  # (K, rows of normals, 3), where it has normals
 
 
 @dataclass
@@ -73,6 +77,15 @@ class Object:
 
 
 @dataclass
+class InstanceMotion:
+    """Where instances stand while the shutter is open: those that move, M of them."""
+
+    instance: U32  # (M,) rows of Instances
+    keys: U32  # (M,) how many matrices each has, evenly spaced from the opening to the closing, at least 2
+    matrix: F64  # (sum of keys, 3, 4) as Instances.matrix, instance by instance
+
+
+@dataclass
 class Instances:
     """One row per instance; N rows in every array."""
 
@@ -81,6 +94,7 @@ class Instances:
     random: F32  # (N,) Object Info > Random, 0..1
     generated: F32  # (N, 3) instancer's generated coordinates
     uv: F32  # (N, 2) instancer's UV
+    motion: InstanceMotion | None = None  # None: all stand still. matrix is that of the shutter's middle
 
 
 @dataclass
@@ -181,6 +195,25 @@ class World:
 
 
 @dataclass
+class Shutter:
+    """When it is open. Times of everything that moves run from 0, when it opens, to 1, when it closes."""
+
+    length: float = 0.5  # frames
+    position: str = "CENTER"  # the frame is its "START", "CENTER" or "END"
+    curve: F32 | None = None  # (N,) how far it is open at evenly spaced times; None: alike all the time
+    rolling: float | None = None  # share of the time that a line of pixels sees, the top line first; None: all see all
+    still: list[str] = field(default_factory=list)  # what could move and is told not to, a fact each
+
+
+@dataclass
+class CameraMotion:
+    """A camera while the shutter is open, at evenly spaced times."""
+
+    matrix: F64  # (K, 3, 4) as Camera.matrix
+    lens_mm: tuple[float, float] | None = None  # when the shutter opens and when it closes; None: does not change
+
+
+@dataclass
 class Camera:
     kind: str = "PERSP"  # "PERSP", "ORTHO", "EQUIRECTANGULAR"
     matrix: F64 = field(default_factory=_identity)  # (3, 4) camera to world, looks along -Z, Y up
@@ -201,6 +234,7 @@ class Camera:
     aperture_ratio: float = 1.0
     latitude: tuple[float, float] = (-1.5707964, 1.5707964)
     longitude: tuple[float, float] = (-3.1415927, 3.1415927)
+    motion: CameraMotion | None = None  # None: stands still. matrix and lens are those of the shutter's middle
 
 
 @dataclass
@@ -281,6 +315,7 @@ class Scene:
     settings: Settings = field(default_factory=Settings)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # subtracted from every position in double
     frame: int = 1
+    shutter: Shutter | None = None  # None: the picture is of an instant, and nothing moves
     warnings: list[str] = field(default_factory=list)  # one sentence each: object, fact, remedy
     # What the exporter met and Luch does not draw yet: name of an effect (luch.effects) -> its warnings.
     unsupported: dict[str, list[str]] = field(default_factory=dict)

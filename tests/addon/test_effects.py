@@ -87,10 +87,6 @@ def test_an_f_stop_without_depth_of_field_is_told(room: bpy.types.Scene) -> None
     assert exported(room)["depth of field"].on
 
 
-def motion(scene: bpy.types.Scene) -> None:
-    scene.render.use_motion_blur = True
-
-
 def uneven_volume(scene: bpy.types.Scene) -> None:
     tree = bpy.data.materials["Leaves"].node_tree
     fog, noise = tree.nodes.new("ShaderNodeVolumeScatter"), tree.nodes.new("ShaderNodeTexNoise")
@@ -109,7 +105,6 @@ def displaced(scene: bpy.types.Scene) -> None:
 @pytest.mark.parametrize(
     ("effect", "ask", "who"),
     [
-        ("motion blur", motion, "Scene"),
         ("heterogeneous volumes", uneven_volume, "Leaves"),
         ("displacement", displaced, "Leaves"),
     ],

@@ -35,7 +35,7 @@ from support import pictures  # noqa: E402
 F32 = NDArray[np.float32]
 SCENES = [
     "cornell_box", "veach_mis", "modern_hall", "white_room", "conference_room", "little_lamp",
-    "material_testball_hdri", "stanford_dragon", "stone_knight_dof", "bmw27", "sponza_1024_lights",
+    "material_testball_hdri", "stanford_dragon", "stone_knight_dof", "bmw27", "sponza_1024_lights", "cesium_man_blur",
 ]  # fmt: skip
 OUT = ROOT / "out" / "bench"
 CYCLES_SAMPLES = 64

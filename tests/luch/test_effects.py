@@ -261,9 +261,7 @@ def test_point_clouds_are_told_with_their_spheres() -> None:
     assert effects["instancing"].cost == "saves 2 triangles and 10 spheres"
 
 
-@pytest.mark.parametrize(
-    "effect", ["motion blur", "hair", "point clouds", "heterogeneous volumes", "displacement", "subsurface"]
-)
+@pytest.mark.parametrize("effect", ["hair", "point clouds", "heterogeneous volumes", "displacement", "subsurface"])
 def test_what_the_exporter_left_out_is_named_in_its_own_words(effect: str) -> None:
     subject = scene(principled)
     assert effects_of(subject)[effect].state == "off"

@@ -47,13 +47,14 @@ class Accel {
 
     // Ray i sees the instances whose visibility shares a bit with ray_kinds[i]; null: all of them.
     // A ray with a non-finite origin or direction, a zero direction or a NaN interval misses.
+    // times: of each ray, 0 to 1 while the shutter is open; null: all in its middle. Unread where nothing moves.
     // counters null: none are kept, by code compiled without them; else the work of all rays is added to it.
-    virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count,
+    virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count, const float* times = nullptr,
                          Counters* counters = nullptr) const = 0;
 
     // blocked[i]: BLOCKED_OPAQUE if an opaque primitive lies in the interval, else BLOCKED_MAYBE if one that
     // may be transparent does (walk them with closest), else BLOCKED_NOT.
-    virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count,
+    virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count, const float* times = nullptr,
                      Counters* counters = nullptr) const = 0;
 
     virtual AccelStats stats() const = 0;

@@ -5,6 +5,7 @@
 
 #include "cpu/accel/accel.h"
 #include "cpu/accel/build_bvh8.h"
+#include "cpu/accel/build_moving.h"
 #include "cpu/accel/group.h"
 #include "cpu/accel/tree2.h"
 
@@ -235,8 +236,14 @@ Tree8 collapse_tree(Group& group, const PrimBox* boxes, size_t kept, const Gathe
 
 }  // namespace
 
+Group::Group() = default;
+Group::Group(Group&&) noexcept = default;
+Group& Group::operator=(Group&&) noexcept = default;
+Group::~Group() = default;
+
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                  const AccelChoice& choice, ThreadPool& pool) {
+    if (group.deforms) return build_moving_group(group, scene, flags, choice, pool);
     Gather gather(group, scene, flags);
     size_t kept = 0;
     HugeArray<PrimBox> boxes = gather_boxes(group, gather, pool, &kept);

@@ -2,6 +2,7 @@
 #include "cpu/accel/group.h"
 
 #include "cpu/accel/accel.h"
+#include "cpu/accel/build_moving.h"
 #include "cpu/accel/leaf.h"
 #include "cpu/accel/sphere_blocks.h"
 #include "cpu/accel/traverse.h"
@@ -50,6 +51,14 @@ auto with_block_ray(const Group& group, Act&& act) {
     return act.template operator()<BlockRay>();
 }
 
+// Calls act with the group's precision.
+template <class Act>
+auto with_precision(Precision precision, Act&& act) {
+    if (precision == Precision::FAST) return act.template operator()<Precision::FAST>();
+    if (precision == Precision::DOUBLE) return act.template operator()<Precision::DOUBLE>();
+    return act.template operator()<Precision::WATERTIGHT>();
+}
+
 inline Counters* pointer_to(Counters& count) { return &count; }
 inline Counters* pointer_to(NoCounters&) { return nullptr; }
 
@@ -79,5 +88,23 @@ u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max
 }
 template u8 any_in_group(const Group&, const LaneRay&, float, float, NoCounters&);
 template u8 any_in_group(const Group&, const LaneRay&, float, float, Counters&);
+
+template <class Count>
+void closest_in_moving(const Group& group, const LaneRay& ray, float t_min, float time, RefHit* best, Count& count) {
+    Ray inside = {ray.origin3(), t_min, ray.direction3(), best->t};
+    with_precision(group.precision,
+                   [&]<Precision P>() { closest_hit<P>(group.moving->view, inside, time, best, count); });
+}
+template void closest_in_moving(const Group&, const LaneRay&, float, float, RefHit*, NoCounters&);
+template void closest_in_moving(const Group&, const LaneRay&, float, float, RefHit*, Counters&);
+
+template <class Count>
+u8 any_in_moving(const Group& group, const LaneRay& ray, float t_min, float t_max, float time, Count& count) {
+    Ray inside = {ray.origin3(), t_min, ray.direction3(), t_max};
+    return with_precision(group.precision,
+                          [&]<Precision P>() { return any_hit<P>(group.moving->view, inside, time, count); });
+}
+template u8 any_in_moving(const Group&, const LaneRay&, float, float, float, NoCounters&);
+template u8 any_in_moving(const Group&, const LaneRay&, float, float, float, Counters&);
 
 }  // namespace luch::cpu

@@ -13,6 +13,7 @@
 namespace luch::cpu {
 
 struct LaneRay;  // traverse.h
+struct MovingTrees;  // build_moving.h
 
 using Member = GroupMember;
 
@@ -29,12 +30,19 @@ struct Group {
     std::vector<u8> flags;        // PrimitiveFlag by ref; empty: none
     bool left = false;            // a device builds its structure from corners (zeros where dropped) and flags
     Box root;
+    bool deforms = false;         // its mesh changes its shape: moving holds it, and nothing above
+    std::unique_ptr<MovingTrees> moving;
     u64 kept = 0, dropped = 0;    // primitives
+
+    Group();
+    Group(Group&&) noexcept;
+    Group& operator=(Group&&) noexcept;
+    ~Group();
 
     const Member& member_of(u32 ref) const { return luch::member_of(members.data(), u32(members.size()), ref); }
 };
 
-// Fills everything but members and of_spheres, which say what to gather. flags: per mesh, per primitive PrimitiveFlag.
+// Fills everything but members, of_spheres and deforms, which say what to gather. flags: per mesh, per primitive PrimitiveFlag.
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                  const AccelChoice& choice, ThreadPool& pool);
 
@@ -44,5 +52,11 @@ void closest_in_group(const Group& group, const LaneRay& ray, float t_min, RefHi
 // A Blocked value.
 template <class Count>
 u8 any_in_group(const Group& group, const LaneRay& ray, float t_min, float t_max, Count& count);
+
+// The same of a group that changes its shape, at a time.
+template <class Count>
+void closest_in_moving(const Group& group, const LaneRay& ray, float t_min, float time, RefHit* hit, Count& count);
+template <class Count>
+u8 any_in_moving(const Group& group, const LaneRay& ray, float t_min, float t_max, float time, Count& count);
 
 }  // namespace luch::cpu

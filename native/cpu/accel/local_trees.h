@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cpu/accel/accel.h"
+#include "cpu/accel/build_moving.h"
 #include "cpu/accel/group.h"
 #include "cpu/device_image.h"
 #include "luch/accel/local_trees.h"
@@ -18,8 +19,9 @@ class LocalTrees {
     LocalTrees(const SceneView& scene, const std::vector<u8>& wanted, Precision precision, bool for_device,
                ThreadPool& pool);
 
-    // The nearest hit in the instance, as Accel::closest gives it; t of a miss is infinite. Not of trees for a device.
-    Hit closest(u32 instance, const Ray& ray) const;
+    // The nearest hit in the instance as it is at that time, as Accel::closest gives it; t of a miss is infinite. Not of
+    // trees for a device.
+    Hit closest(u32 instance, const Ray& ray, float time = SHUTTER_MIDDLE) const;
 
     // The view of trees for a device, and everything behind it as the image's; `block` holds the pointer to it.
     const LocalTreesView* view() const { return &view_; }
@@ -33,6 +35,7 @@ class LocalTrees {
     std::vector<Group> groups_;
     std::vector<LocalTreeEntry> entries_;  // per instance
     std::vector<Cwbvh> trees_;             // of groups, for a device
+    SceneMotion motion_;
     LocalTreesView view_ = {};
     u64 bytes_ = 0;
 };

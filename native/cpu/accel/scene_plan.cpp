@@ -76,7 +76,7 @@ class Planner {
             u32 group = u32(plan.groups.size());
             found = flat_.insert(found, {instance.visibility, group, 0});
             plan.groups.emplace_back();
-            plan.entries.push_back({{}, group, NONE, instance.visibility, 0});
+            plan.entries.push_back({{}, group, NONE, instance.visibility, 0u});
         }
         plan.groups[found->group].members.push_back({instance.mesh, i, u32(found->refs), 0, triangles});
         found->refs += triangles;
@@ -106,10 +106,12 @@ class Planner {
             Group& made = plan.groups.emplace_back();
             made.members = {primitives};
             made.of_spheres = of_spheres;
+            made.deforms = !of_spheres && scene_.motion && scene_.motion->meshes[primitives.mesh].key_count != 0;
         }
         const InstanceView& instance = scene_.instances[i];
         if (is_finite(instance.to_world) && is_finite(instance.to_object))
-            plan.entries.push_back({instance.to_object, *group, i, instance.visibility, 0});
+            plan.entries.push_back({instance.to_object, *group, i, instance.visibility,
+                                    plan.motion.add(scene_, i, plan.groups[*group].deforms ? *group : NONE)});
         else
             (of_spheres ? plan.dropped_spheres : plan.dropped_triangles) += primitives.prim_count;
     }
@@ -128,7 +130,8 @@ ScenePlan plan_scene(const SceneView& scene, u64 flatten_triangles) {
         const InstanceView& instance = scene.instances[i];
         const MeshView& mesh = scene.meshes[instance.mesh];
         if (instance.visibility == 0) continue;
-        if (mesh.triangle_count > 0 && flatten[instance.mesh])
+        bool still = !(instance.flags & (INSTANCE_MOVES | INSTANCE_DEFORMS));
+        if (mesh.triangle_count > 0 && flatten[instance.mesh] && still)
             planner.add_to_world(i);
         else if (mesh.triangle_count > 0)
             planner.share_triangles(i);
@@ -154,6 +157,7 @@ void build_groups(ScenePlan& plan, const SceneView& scene, const std::vector<std
         for (size_t i = begin; i < end; ++i) build_group(plan.groups[small[i]], scene, flags, choice, pool);
     });
     std::erase_if(plan.entries, [&](const GroupEntry& entry) { return plan.groups[entry.group].kept == 0; });
+    plan.motion.finish(plan.groups);
 }
 
 void count_primitives(const Group& group, AccelStats* stats) {
@@ -169,6 +173,13 @@ EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene) {
         const GroupEntry& entry = plan.entries[i];
         const Box& box = plan.groups[entry.group].root;
         boxes[i] = entry.instance == NONE ? box : world_box(scene.instances[entry.instance].to_world, box);
+        if (entry.motion) {
+            const InstanceMotion& way = plan.motion.entries[entry.motion - 1].transform;
+            const TransformKey* keys = plan.motion.keys.data() + way.first_key;
+            if (way.key_count) boxes[i] = swept_box(keys, way.key_count, box);
+            for (u32 k = 0; k < way.key_count; ++k)
+                for (float place : keys[k].place) out.error.size = max_f(abs_f(place), out.error.size);
+        }
         out.error.size = max_f(size_of(boxes[i]), out.error.size);
         if (entry.instance == NONE) continue;
         const Affine& m = scene.instances[entry.instance].to_world;
@@ -178,6 +189,10 @@ EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene) {
         float wider = 0.0f;
         u32 instance = plan.entries[i].instance;
         float c = instance == NONE ? 1.0f : condition(scene.instances[instance]);
+        if (u32 motion = plan.entries[i].motion) {
+            const InstanceMotion& way = plan.motion.entries[motion - 1].transform;
+            c = max_f(c, swept_condition(plan.motion.keys.data() + way.first_key, way.key_count));
+        }
         if (c > CONDITION_LIMIT)
             wider = INSTANCE_ERROR * c * 4.0f * out.error.size;  // for origins within thrice the scene's size
         else

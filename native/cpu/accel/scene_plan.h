@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "cpu/accel/build_bvh8.h"
+#include "cpu/accel/build_moving.h"
 #include "cpu/accel/group.h"
 #include "luch/accel/instances.h"
 
@@ -11,6 +12,7 @@ namespace luch::cpu {
 struct ScenePlan {
     std::vector<Group> groups;                       // what to gather
     std::vector<GroupEntry> entries;
+    SceneMotion motion;
     u64 dropped_triangles = 0, dropped_spheres = 0;  // of instances whose transforms are not finite
 };
 

@@ -67,6 +67,8 @@ class SceneTreesOf final : public SceneTrees {
         bool one = plan.entries.size() == 1 && plan.entries[0].instance == NONE;
         if (!one && !plan.entries.empty()) build_top(plan, scene, pool);
         groups_ = std::move(plan.groups);
+        motion_ = std::move(plan.motion);
+        if (motion_.moves()) view_.motion = &motion_.view;
         for (u32 g = 0; g < groups_.size(); ++g) trace_group(g);
         view_.groups = traced_.data();
         view_.group_count = u32(traced_.size());
@@ -98,6 +100,7 @@ class SceneTreesOf final : public SceneTrees {
             if (is_one_group() && array.group == only_group_)
                 image.links.push_back({root, offsetof(TwoLevelView<View>, only) + array.field, target, at});
         }
+        if (view_.motion) motion_.describe(image, root, view_.motion, groups_);
         return root;
     }
 
@@ -116,18 +119,22 @@ class SceneTreesOf final : public SceneTrees {
     }
 
     bool is_one_group() const override { return view_.only_visibility != 0; }
+    bool moves() const override { return motion_.moves(); }
     StructureKind kind() const override { return kind_; }
     SceneTreesStats stats() const override { return stats_; }
 
-    void closest(const Ray* rays, const u32* kinds, Hit* hits, size_t count) const override {
+    void closest(const Ray* rays, const u32* kinds, Hit* hits, size_t count, const float* times) const override {
         with_precision(precision_, [&]<Precision P>() {
             for (size_t i = 0; i < count; ++i)
-                hits[i] = closest_hit<P>(view_, rays[i], kinds ? kinds[i] : u32(RAY_ALL));
+                hits[i] =
+                    closest_hit<P>(view_, rays[i], kinds ? kinds[i] : u32(RAY_ALL), times ? times[i] : SHUTTER_MIDDLE);
         });
     }
-    void any(const Ray* rays, const u32* kinds, u8* blocked, size_t count) const override {
+    void any(const Ray* rays, const u32* kinds, u8* blocked, size_t count, const float* times) const override {
         with_precision(precision_, [&]<Precision P>() {
-            for (size_t i = 0; i < count; ++i) blocked[i] = any_hit<P>(view_, rays[i], kinds ? kinds[i] : u32(RAY_ALL));
+            for (size_t i = 0; i < count; ++i)
+                blocked[i] =
+                    any_hit<P>(view_, rays[i], kinds ? kinds[i] : u32(RAY_ALL), times ? times[i] : SHUTTER_MIDDLE);
         });
     }
 
@@ -191,6 +198,10 @@ class SceneTreesOf final : public SceneTrees {
         u32 deepest = 0;
         for (const Group& group : groups_) {
             count_primitives(group, &stats_);
+            if (group.moving) {
+                stats_.nodes += group.moving->nodes();
+                stats_.bytes += group.moving->bytes();
+            }
             if (!group.structure) continue;
             StructureStats own = group.structure->stats();
             stats_.nodes += own.nodes;
@@ -207,6 +218,7 @@ class SceneTreesOf final : public SceneTrees {
     std::vector<GroupEntry> entries_;  // leaf by leaf
     std::vector<GroupArray> arrays_;
     CommonBlock common_;
+    SceneMotion motion_;
     u32 only_group_ = 0;
     TwoLevelView<View> view_ = {};
     SceneTreesStats stats_;

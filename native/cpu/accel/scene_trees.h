@@ -38,11 +38,15 @@ class SceneTrees {
     virtual u32 append(DeviceImage& image) const = 0;
     // All is one group in the world: kernels made for that (render/trace_one.cuh) may walk it.
     virtual bool is_one_group() const = 0;
+    // Something in them moves: kernels must be compiled for it (plan::MOTION).
+    virtual bool moves() const = 0;
     virtual StructureKind kind() const = 0;
 
     // As Accel's, by the functions that devices run. Groups that are left for the device are not there.
-    virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count) const = 0;
-    virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count) const = 0;
+    virtual void closest(const Ray* rays, const u32* ray_kinds, Hit* hits, size_t count,
+                         const float* times = nullptr) const = 0;
+    virtual void any(const Ray* rays, const u32* ray_kinds, u8* blocked, size_t count,
+                     const float* times = nullptr) const = 0;
 
     virtual SceneTreesStats stats() const = 0;
 };

@@ -30,6 +30,7 @@ void blend_normals_in_world(const std::vector<MeshView>& meshes, std::vector<Ins
     for (const InstanceView& instance : instances) users[instance.mesh]++;
     for (InstanceView& instance : instances) {
         const MeshView& mesh = meshes[instance.mesh];
+        if (instance.flags & (INSTANCE_MOVES | INSTANCE_DEFORMS)) continue;  // as in Cycles, which leaves them apart
         if (mesh.normals_domain == Domain::NONE_ || users[instance.mesh] != 1u || !is_uneven(instance.to_world))
             continue;
         size_t rows = mesh.normals_domain == Domain::POINT ? mesh.vertex_count : size_t(mesh.triangle_count) * 3;

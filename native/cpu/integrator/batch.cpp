@@ -7,6 +7,11 @@
 #include "luch/integrator/found_light.h"
 
 namespace luch::cpu {
+namespace {
+
+const float* times_of(const std::vector<float>& times) { return times.empty() ? nullptr : times.data(); }
+
+}  // namespace
 
 Batch::Batch(const RenderScene& scene, const FilmView& film)
     : scene_(scene),
@@ -33,6 +38,11 @@ Batch::Batch(const RenderScene& scene, const FilmView& film)
     media_.resize(scene.has_media ? BATCH_PATHS : 0);
     shadow_media_.resize(scene.has_media ? shadows : 0);
     material_first_.resize(scene.view.material_count + 1);
+    if (has_motion(scene)) {
+        ray_time_.resize(BATCH_PATHS);
+        next_time_.resize(BATCH_PATHS);
+        shadow_time_.resize(shadows);
+    }
     aovs_.resize(size_t(film.layout.aov_count) * 4 * SHADE_LANES);
 }
 
@@ -47,6 +57,7 @@ void BatchCounts::add(const BatchCounts& other) {
     clamped += other.clamped;
     cut += other.cut;
     lens_samples += other.lens_samples;
+    time_samples += other.time_samples;
     lamp_searches += other.lamp_searches;
     transparent_steps += other.transparent_steps;
     world_points += other.world_points;
@@ -80,6 +91,7 @@ void Batch::trace(const PixelBlock& block) {
         trace_shadows();
         std::swap(rays_, next_rays_);
         std::swap(ray_path_, next_path_);
+        std::swap(ray_time_, next_time_);
         ray_count_ = next_count_;
     }
 }
@@ -100,6 +112,7 @@ void Batch::generate(const PixelBlock& block) {
         }
     }
     counts_.paths += u64(ray_count_);
+    if (has_motion(scene_)) counts_.time_samples += u64(ray_count_);
 }
 
 void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
@@ -117,11 +130,13 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
     for (u32 i = 0; i < count; i++) {
         int k = ray_count_++;
         u32 sample = first_sample + i;
-        rays_[k] = begin_path(scene_, writer_.film, px, py, sample, make_sampler(pixel, sample),
-                              {filter_u[0][i], filter_u[1][i]}, {lens_u[0][i], lens_u[1][i]}, paths_[k]);
+        Sampler sampler = make_sampler(pixel, sample);
+        if (has_motion(scene_)) ray_time_[k] = path_time(scene_, sampler, py);
+        rays_[k] = begin_path(scene_, writer_.film, px, py, sample, sampler, {filter_u[0][i], filter_u[1][i]},
+                              {lens_u[0][i], lens_u[1][i]}, time_of(u32(k)), paths_[k]);
         ray_path_[k] = u32(k);
         if (scene_.has_media) {
-            OnePoint one{*this};
+            OnePoint one{*this, time_of(u32(k))};
             media_[k] = media_at_lens(scene_, rays_[k].origin, one);
         }
     }
@@ -129,7 +144,7 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
 
 void Batch::traverse() {
     for (int k = 0; k < ray_count_; k++) ray_kind_[k] = paths_[ray_path_[k]].visibility;
-    scene_.accel->closest(rays_.data(), ray_kind_.data(), hits_.data(), size_t(ray_count_));
+    scene_.accel->closest(rays_.data(), ray_kind_.data(), hits_.data(), size_t(ray_count_), times_of(ray_time_));
     counts_.rays += u64(ray_count_);
 }
 
@@ -216,10 +231,12 @@ void Batch::shade_hits() {
 
 void Batch::trace_shadows() {
     if (shadow_count_ == 0) return;
-    scene_.accel->any(shadow_rays_.data(), shadow_kind_.data(), blocked_.data(), size_t(shadow_count_));
+    scene_.accel->any(shadow_rays_.data(), shadow_kind_.data(), blocked_.data(), size_t(shadow_count_),
+                      times_of(shadow_time_));
     counts_.shadow_rays += u64(shadow_count_);
     OnePoint one{*this};
     for (int k = 0; k < shadow_count_; k++) {
+        if (!shadow_time_.empty()) one.time = shadow_time_[k];
         const ShadowRay& shadow = shadows_[k];
         const PathState& path = paths_[shadow.path];
         Color through = make_vec3(1.0f);

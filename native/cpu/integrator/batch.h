@@ -22,6 +22,7 @@ struct BatchCounts {
     u64 paths = 0, rays = 0, shadow_rays = 0, surface_points = 0, bad_samples = 0;
     u64 clamped = 0, cut = 0;   // as FilmWriter has them
     u64 lens_samples = 0;       // camera rays that chose a point of the aperture
+    u64 time_samples = 0;       // and a time, where something moves
     u64 lamp_searches = 0;      // rays that looked for lamps on their way
     u64 transparent_steps = 0;  // surfaces that shadow rays looked through, one by one
     u64 world_points = 0;       // directions in which the world's program ran for a ray
@@ -63,6 +64,7 @@ class Batch {
     // cross_media.cpp: what lies between surfaces, where the scene has media
     void cross_media();
     void cross_media(int k);
+    void go_on(u32 path_index, u32 k);
     void pass_borders(u32 begin, u32 end);
 
     // shade_surface.cpp: one chunk of points that share a material
@@ -79,7 +81,7 @@ class Batch {
     // direct_light.cpp
     void sample_lights(const u32* queue, int lit_count);
     void emission_of_samples(const u32* queue, const int* lanes, int count);
-    void push_shadow(bool made);
+    void push_shadow(bool made, u32 k);
 
     // What the shared headers ask of a device: a light's or a transparent surface's program at one point, and a ray.
     struct OnePoint;
@@ -103,6 +105,8 @@ class Batch {
     std::vector<u32> shadow_kind_;
     std::vector<u8> blocked_;
     std::vector<MediumStack> media_, shadow_media_;  // by path, by shadow ray; empty without media
+    std::vector<float> ray_time_, next_time_, shadow_time_;  // of rays_, next_rays_, shadow_rays_; none: nothing moves
+    float time_of(u32 k) const { return ray_time_.empty() ? SHUTTER_MIDDLE : ray_time_[k]; }
 
     int walk_count_ = 0;
     std::vector<SubsurfaceWalk> walks_;  // of this generation; none where nothing scatters under its surface

@@ -4,8 +4,10 @@
 
 namespace luch::cpu {
 
-void Batch::push_shadow(bool made) {
-    if (made) shadow_kind_[shadow_count_++] = RAY_SHADOW;
+void Batch::push_shadow(bool made, u32 k) {
+    if (!made) return;
+    if (!shadow_time_.empty()) shadow_time_[shadow_count_] = ray_time_[k];
+    shadow_kind_[shadow_count_++] = RAY_SHADOW;
 }
 
 void Batch::sample_lights(const u32* queue, int lit_count) {
@@ -29,7 +31,7 @@ void Batch::sample_lights(const u32* queue, int lit_count) {
                                     &shadows_[shadow_count_]);
         if (made && scene_.has_media)
             shadow_media_[shadow_count_] = media_towards(scene_, media_[path], points, lane, ray.direction);
-        push_shadow(made);
+        push_shadow(made, queue[lane]);
     }
 }
 
@@ -37,7 +39,8 @@ void Batch::sample_lights(const u32* queue, int lit_count) {
 void Batch::emission_of_samples(const u32* queue, const int* lanes, int count) {
     int open[SHADE_LANES], open_count = 0;
     for (int i = 0; i < count; i++) {
-        const ConstantEmission constant = emission_of(scene_, scratch_->samples[lanes[i]]);
+        const ConstantEmission constant =
+            emission_of(scene_, scratch_->samples[lanes[i]], lane_time(scratch_->points, lanes[i]));
         if (constant.constant) {
             scratch_->emission[lanes[i]] = constant.radiance;
         } else {
@@ -61,7 +64,7 @@ void Batch::emission_of_samples(const u32* queue, const int* lanes, int count) {
         for (int i = 0; i < chosen_count; i++) {
             u32 path = ray_path_[queue[chosen[i]]];
             setup_light_lane(scene_, paths_[path], path, scratch_->samples[chosen[i]],
-                             scratch_->points.footprint[chosen[i]], points, i);
+                             scratch_->points.footprint[chosen[i]], lane_time(scratch_->points, chosen[i]), points, i);
         }
         run_program(scene_.view, *program, points, scratch_->light_sets, registers_.data(), nullptr, 0, Wanted::LIGHT);
         for (int i = 0; i < chosen_count; i++) scratch_->emission[chosen[i]] = scratch_->light_sets[i].emission;

@@ -14,6 +14,9 @@ struct RenderScene : RenderView {
     const LocalTrees* walk_trees = nullptr;  // null: nothing scatters under its surface
     PixelFilter filter_table;
     std::vector<ConstantEmission> emission_of_materials;
+    ShutterView shutter_view{};
+    std::vector<TransformKey> camera_keys;
+    std::vector<float> shutter_times;
     size_t max_registers = 0;  // of any program
 
     RenderScene() : RenderView{} {}

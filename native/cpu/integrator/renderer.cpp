@@ -80,6 +80,9 @@ void Renderer::build_all() {
         scene_.media =
             input_.media.view(scene_.view, scene_.camera, float(input_.frame_width), float(input_.frame_height));
     }
+    build_shutter();
+    // The borders between the camera's place in the shutter's middle and where it is at other times.
+    if (scene_.has_media && scene_.shutter && scene_.shutter->camera_keys) scene_.media.camera_walks = true;
     find_constants();
     start = seconds_now();
     build_lights();
@@ -87,6 +90,25 @@ void Renderer::build_all() {
     for (unsigned worker = 0; worker < pool_.size() && !input_.for_device; worker++) {
         batches_.push_back(std::make_unique<Batch>(scene_, film_.view()));
     }
+}
+
+// Paths have times only where something moves: a shutter that is open over what stands still costs nothing.
+void Renderer::build_shutter() {
+    const MotionInput& in = input_.motion;
+    scene_.camera_keys = in.camera;
+    if (!in.shutter || (!scene_.view.motion && in.camera.empty() && !in.zooms)) return;
+    scene_.shutter_times = invert_shutter_curve(in.curve);
+    ShutterView& shutter = scene_.shutter_view;
+    shutter.times = scene_.shutter_times.empty() ? nullptr : scene_.shutter_times.data();
+    shutter.camera = scene_.camera_keys.empty() ? nullptr : scene_.camera_keys.data();
+    shutter.camera_keys = u32(scene_.camera_keys.size());
+    shutter.zooms = in.zooms;
+    for (int end = 0; end < 2; ++end) {
+        shutter.centre[end] = in.camera_ends[end].centre;
+        shutter.scale[end] = in.camera_ends[end].scale;
+    }
+    shutter.rolling = in.rolling;
+    scene_.shutter = &shutter;
 }
 
 Renderer::~Renderer() = default;
@@ -150,6 +172,11 @@ DeviceImage Renderer::device_image() {
     image.add_array("camera", block, task_.scene.view.camera, 1);
     image.add_array("filter", block, task_.scene.filter, 1);
     if (task_.scene.local_trees) local_trees_->describe(image, block, task_.scene.local_trees);
+    if (task_.scene.shutter) {
+        u32 shutter = image.add_array("shutter", block, task_.scene.shutter, 1);
+        image.add_array("shutter times", shutter, scene_.shutter_view.times, scene_.shutter_times.size());
+        image.add_array("camera keys", shutter, scene_.shutter_view.camera, scene_.camera_keys.size());
+    }
     image.add_array("material_emission", block, task_.scene.material_emission, scene_.emission_of_materials.size());
     return image;
 }

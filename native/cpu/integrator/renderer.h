@@ -13,6 +13,7 @@
 #include "cpu/integrator/batch.h"
 #include "cpu/integrator/render_scene.h"
 #include "cpu/lights.h"
+#include "cpu/motion/keys.h"
 #include "cpu/scene_store.h"
 #include "cpu/sky/world_sun.h"
 #include "cpu/thread_pool.h"
@@ -28,6 +29,16 @@ struct ForcedWork {
     bool transparency = false;  // every surface may let shadow rays through: its program decides
     bool world = false;         // the world's program runs for every ray that leaves
     bool emission = false;      // every surface may shine: its program decides
+};
+
+// What luch.scene says of the shutter and of a camera that moves.
+struct MotionInput {
+    bool shutter = false;               // it is open for a time; else all is still
+    std::vector<float> curve;           // how far open at evenly spaced times; none: alike
+    float rolling = -1.0f;              // as ShutterView's
+    std::vector<TransformKey> camera;
+    bool zooms = false;
+    CameraView camera_ends[2]{};        // when it opens and when it closes, for the field of view
 };
 
 // What the renderer is made from, beside the SceneStore.
@@ -52,6 +63,7 @@ struct RenderInput {
     ForcedWork forced;
     float mist_start = 0.0f, mist_depth = 25.0f, mist_exponent = 2.0f;
     double origin[3] = {0.0, 0.0, 0.0};
+    MotionInput motion;
 };
 
 struct RenderStats {
@@ -99,6 +111,7 @@ class Renderer {
     void build_device_trees();
     void find_constants();
     void build_lights();
+    void build_shutter();
     WorldSun find_sun(WorldInput& world);  // and tells the world of it
     std::vector<float> world_map(int width, int height, const WorldSun& sun);
 

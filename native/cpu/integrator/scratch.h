@@ -20,6 +20,7 @@ struct Batch::Scratch {
 
 struct Batch::OnePoint {
     Batch& batch;
+    float time = SHUTTER_MIDDLE;  // of what it traces
 
     const ClosureSet& light(const Program& program, const ShadePoints& points) {
         run_program(batch.scene_.view, program, points, batch.scratch_->light_sets, batch.registers_.data(), nullptr, 0,
@@ -30,7 +31,7 @@ struct Batch::OnePoint {
     Hit closest_of_all(const Ray& ray) { return closest(ray, RAY_ALL); }
     Hit closest(const Ray& ray, u32 kind) {
         Hit hit;
-        batch.scene_.accel->closest(&ray, &kind, &hit, 1);
+        batch.scene_.accel->closest(&ray, &kind, &hit, 1, batch.ray_time_.empty() ? nullptr : &time);
         return hit;
     }
 };

@@ -36,7 +36,7 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
             make_ao_ray(scene_, path, path_index, points, lane, set, spawn, &shadow_rays_[shadow_count_],
                         &shadows_[shadow_count_]);
             if (scene_.has_media) shadow_media_[shadow_count_] = media_[path_index];
-            push_shadow(true);
+            push_shadow(true, k);
         }
         if (scene_.has_subsurface && enters_subsurface(k, lane, set, spawn, {u[0][i], u[1][i], u[2][i]})) continue;
         next_path_[next_count_] = path_index;
@@ -48,6 +48,7 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
 
 // The next ray, which stands at the end of its queue, goes on.
 void Batch::send_next(const ShadePoints& points, int lane) {
+    if (!next_time_.empty()) next_time_[next_count_] = lane_time(points, lane);
     if (scene_.has_media) {
         MediumStack& media = media_[next_path_[next_count_]];
         media = media_towards(scene_, media, points, lane, next_rays_[next_count_].direction);
@@ -77,10 +78,11 @@ void Batch::setup_chunk(const u32* queue, int count, ShadePoints& points) {
     for (int lane = 0; lane < count; lane++) {
         u32 k = queue[lane];
         SurfacePoint& spawn = scratch_->spawn[lane];
-        spawn = surface_point(scene_.view, hits_[k], rays_[k]);
-        setup_surface_lane(scene_.view,
-                           surface_inputs(paths_[ray_path_[k]], ray_path_[k], hits_[k], spawn, rays_[k].direction),
-                           points, lane);
+        spawn = surface_point(scene_.view, hits_[k], rays_[k], time_of(k));
+        setup_surface_lane(
+            scene_.view,
+            surface_inputs(paths_[ray_path_[k]], ray_path_[k], hits_[k], spawn, rays_[k].direction, time_of(k)), points,
+            lane);
     }
 }
 

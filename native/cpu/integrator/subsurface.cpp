@@ -9,7 +9,8 @@ namespace {
 
 struct LocalTracer {
     const LocalTrees& trees;
-    Hit closest(u32 instance, const Ray& ray) const { return trees.closest(instance, ray); }
+    float time;  // of the walk
+    Hit closest(u32 instance, const Ray& ray) const { return trees.closest(instance, ray, time); }
 };
 
 }  // namespace
@@ -25,10 +26,11 @@ bool Batch::enters_subsurface(u32 k, int lane, const ClosureSet& set, const Surf
 
 // All walks of this generation; then, material by material, what comes out is lit and goes on.
 void Batch::walk_subsurface() {
-    LocalTracer tracer{*scene_.walk_trees};
+    LocalTracer tracer{*scene_.walk_trees, SHUTTER_MIDDLE};
     counts_.subsurface_walks += u64(walk_count_);
     int exits = 0;
     for (int i = 0; i < walk_count_; i++) {
+        tracer.time = time_of(walks_[size_t(i)].ray);
         pass_inside(scene_.view, walks_[size_t(i)], tracer, &counts_.subsurface_steps);
         if (walks_[size_t(i)].hit.instance == NONE) continue;
         if (exits != i) walks_[size_t(exits)] = walks_[size_t(i)];
@@ -66,8 +68,9 @@ void Batch::shade_exits(u32 material_index, const u32* queue, int count) {
         rays[lane] = walk.ray;
         scratch_->lit_lanes[lane] = lane;
         SurfacePoint& spawn = scratch_->spawn[lane];
-        spawn = exit_point(scene_, walk);
-        setup_surface_lane(scene_.view, exit_inputs(path, ray_path_[walk.ray], walk, spawn), points, lane);
+        float time = time_of(walk.ray);
+        spawn = exit_point(scene_, walk, time);
+        setup_surface_lane(scene_.view, exit_inputs(path, ray_path_[walk.ray], walk, spawn, time), points, lane);
     }
     bool bent = program.flags & PROGRAM_SUBSURFACE_BUMP;
     if (bent) run_program(scene_.view, program, points, sets, registers_.data());

@@ -40,6 +40,41 @@ bool all_light(const SceneView& scene, const InstanceView& at) {
     return true;
 }
 
+// Lights that move are looked at so many times while the shutter is open.
+constexpr u32 LOOKS = 17;
+float look_time(u32 look) { return float(look) / float(LOOKS - 1); }
+bool is_moving(const InstanceView& at) { return (at.flags & (INSTANCE_MOVES | INSTANCE_DEFORMS)) != 0u; }
+
+// Widens the bounds of a triangle, those of the shutter's middle, to all places and directions on its way: an emitter is
+// chosen by bounds, and sampled where it is at the path's time.
+void follow_triangle(const SceneView& scene, u32 instance, u32 prim, EmitterBounds* b) {
+    Vec3 low = b->low, high = b->high;
+    auto corners_at = [&](float time) {
+        InstanceView moved;
+        const InstanceView& at = instance_at_time(scene, instance, time, &moved);
+        Triangle t = triangle_at(scene, at, prim, time);
+        for (Vec3& p : t.p) p = transform_point(at.to_world, p);
+        return t;
+    };
+    auto normal_of = [](const Triangle& t) { return cross(t.p[1] - t.p[0], t.p[2] - t.p[0]); };
+    // The side that shines is the one that the axis shows in the middle.
+    float side = dot(normal_of(corners_at(SHUTTER_MIDDLE)), b->axis) < 0.0f ? -1.0f : 1.0f;
+    for (u32 look = 0; look < LOOKS; ++look) {
+        Triangle t = corners_at(look_time(look));
+        for (Vec3 p : t.p) {
+            low = min_v(low, p);
+            high = max_v(high, p);
+        }
+        float cosine = side * dot(normalize_or(normal_of(t), b->axis * side), b->axis);
+        b->normals_rad = max_f(b->normals_rad, acos_f(clamp_f(cosine, -1.0f, 1.0f)));
+    }
+    // What may lie between two looks.
+    Vec3 margin = (high - low) * (0.5f / float(LOOKS - 1));
+    b->low = low - margin;
+    b->high = high + margin;
+    b->normals_rad = min_f(b->normals_rad * (1.0f + 1.0f / float(LOOKS - 1)), PI);
+}
+
 // False: no area, or not finite. sides: 1 front, 2 back, 3 both.
 bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, u32 sides, Color estimate, EmitterBounds* b) {
     const InstanceView& at = scene.instances[instance];
@@ -61,6 +96,7 @@ bool triangle_bounds(const SceneView& scene, u32 instance, u32 prim, u32 sides, 
     float strength = luminance(abs_v(estimate));
     b->intensity =
         clamp_f((strength > 0.0f && finite_f(strength) ? strength : 1.0f) * 0.5f * double_area, 1e-30f, 1e30f);
+    if (is_moving(at)) follow_triangle(scene, instance, prim, b);
     return finite_v(b->low) && finite_v(b->high);
 }
 
@@ -193,6 +229,7 @@ class Collector {
         EmitterBounds b{};
         b.low = middle - reach;
         b.high = middle + reach;
+        if (is_moving(at)) follow_cluster(instance, &b);
         b.axis = {0.0f, 0.0f, 1.0f};
         b.normals_rad = PI;
         b.emission_rad = HALF_PI;
@@ -204,6 +241,16 @@ class Collector {
         light.cdf = c.cdf;
         emitters_.push_back({NONE, instance, NONE, NONE});
         bounds_.push_back(b);
+    }
+
+    // Every triangle of it, wherever it is on its way.
+    void follow_cluster(u32 instance, EmitterBounds* b) {
+        for (u32 prim = 0; prim < scene_.meshes[scene_.instances[instance].mesh].triangle_count; ++prim) {
+            EmitterBounds own = *b;
+            follow_triangle(scene_, instance, prim, &own);
+            b->low = min_v(b->low, own.low);
+            b->high = max_v(b->high, own.high);
+        }
     }
 
     const SceneView& scene_;

@@ -15,8 +15,9 @@ __device__ __forceinline__ void shade_exit(const RenderTask& task, const Subsurf
     ShadePoints points;
     ClosureSet set;
     points.count = 1;
-    SurfacePoint spawn = exit_point(scene, walk);
-    setup_surface_lane(scene.view, exit_inputs(path, slot, walk, spawn), points, 0);
+    float time = time_of_ray(wave, walk.ray);
+    SurfacePoint spawn = exit_point(scene, walk, time);
+    setup_surface_lane(scene.view, exit_inputs(path, slot, walk, spawn, time), points, 0);
     Vec3 normal = lane_normal(points, 0);
     if (program.flags & PROGRAM_SUBSURFACE_BUMP) {
         run_program(context_of(scene.view, program, points, set, nullptr));

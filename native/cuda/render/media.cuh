@@ -13,7 +13,7 @@ extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK, LUCH_STAGE_BLOCK
     const Wavefront& wave = task.wave;
     u32 k = stage_index();
     if (k >= wave.counters[WAVE_RAYS]) return;
-    OneRay tracer{trees};
+    OneRay tracer{trees, time_of_ray(wave, k)};
     wave.media[wave.ray_slot[k]] = media_at_lens(task.scene, wave.rays[k].origin, tracer);
 }
 
@@ -27,7 +27,7 @@ LUCH_STAGE(cross_media) {
     PathState path = load_path(wave, slot);
     const MediumStack stack = wave.media[slot];
     Ray ray = wave.rays[k];
-    float reach = wave.hits[k].t;
+    float reach = wave.hits[k].t, time = time_of_ray(wave, k);
     FilmWriter writer = film_of_slot(task, slot);
     ShadePoints points;
     ClosureSet set;
@@ -39,10 +39,10 @@ LUCH_STAGE(cross_media) {
         Ray next;
         ShadowRay shadow;
         if (may_scatter(path, flight) &&
-            light_flight(task.scene, path, slot, stack, ray, flight, shader, points, &next, &shadow))
-            push_shadow(wave, next, shadow, &stack);
+            light_flight(task.scene, path, slot, stack, ray, flight, time, shader, points, &next, &shadow))
+            push_shadow(wave, next, time, shadow, &stack);
         FlightEnd end = fly(task.scene, writer, path, stack, ray, flight, &next);
-        if (end == FlightEnd::SCATTERED) push_ray(wave, next, slot, path.visibility);
+        if (end == FlightEnd::SCATTERED) push_ray(wave, next, time, slot, path.visibility);
         if (end != FlightEnd::AT_SURFACE) wave.hits[k].instance = NONE, wave.hits[k].prim = ENDED_IN_MEDIUM;
         store_path(wave, slot, path);
         add_total(wave, TOTAL_FLIGHTS, 1);

@@ -16,13 +16,13 @@ __device__ __forceinline__ MediumStack beyond(const RenderTask& task, u32 slot, 
 
 // Emission of a light's program at the sampled place.
 __device__ __forceinline__ Color sampled_emission(const RenderTask& task, const PathState& path, u32 slot,
-                                                  const LightSample& sample, float footprint) {
-    ConstantEmission constant = emission_of(task.scene, sample);
+                                                  const LightSample& sample, float footprint, float time) {
+    ConstantEmission constant = emission_of(task.scene, sample, time);
     if (!plan::SAMPLED_PROGRAMS || constant.constant) return constant.radiance;
     ShadePoints points;
     ClosureSet set;
     points.count = 1;
-    setup_light_lane(task.scene, path, slot, sample, footprint, points, 0);
+    setup_light_lane(task.scene, path, slot, sample, footprint, time, points, 0);
     run_light_program(context_of(task.scene.view, program_of(task.scene, sample), points, set, nullptr));
     add_total(task.wave, TOTAL_LIGHT_POINTS, 1);
     return set.emission;
@@ -32,7 +32,7 @@ __device__ __forceinline__ void push_shadow(const RenderTask& task, u32 slot, co
                                             const ShadowRay& shadow) {
     MediumStack media;
     if (plan::VOLUMES && task.wave.media) media = beyond(task, slot, points, ray.direction);
-    push_shadow(task.wave, ray, shadow, plan::VOLUMES && task.wave.media ? &media : nullptr);
+    push_shadow(task.wave, ray, lane_time(points, 0), shadow, plan::VOLUMES && task.wave.media ? &media : nullptr);
 }
 
 __device__ __noinline__ void light_surface(const RenderTask& task, const PathState& path, u32 slot,
@@ -41,7 +41,7 @@ __device__ __noinline__ void light_surface(const RenderTask& task, const PathSta
     LightSample sample;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_LIGHT);
     if (!choose_light(task.scene, path, points, 0, set, u, &sample)) return;
-    Color emission = sampled_emission(task, path, slot, sample, points.footprint[0]);
+    Color emission = sampled_emission(task, path, slot, sample, points.footprint[0], lane_time(points, 0));
     Ray ray;
     ShadowRay shadow;
     if (make_shadow_ray(task.film.layout, path, slot, points, 0, set, spawn, sample, emission, &ray, &shadow))
@@ -55,12 +55,11 @@ __device__ __noinline__ void send_on(const RenderTask& task, PathState& path, u3
     Ray next;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
     FilmWriter writer{task.film, 0};
-    bool goes_on =
-        scatter(task.scene, writer, path, points, 0, set, spawn, u, direction, distance, &next);
+    bool goes_on = scatter(task.scene, writer, path, points, 0, set, spawn, u, direction, distance, &next);
     add_totals(wave, writer);
     if (!goes_on) return;
     if (plan::VOLUMES && wave.media) wave.media[slot] = beyond(task, slot, points, next.direction);
-    push_ray(wave, next, slot, path.visibility);
+    push_ray(wave, next, lane_time(points, 0), slot, path.visibility);
 }
 
 }  // namespace luch

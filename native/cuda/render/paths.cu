@@ -24,11 +24,13 @@ extern "C" __global__ void begin_paths(const __grid_constant__ luch::RenderTask 
     u32 px = task.film.x0 + pixel % task.film.width, py = task.film.y0 + pixel / task.film.width;
     FilmWriter writer = film_of_slot(task, slot);
     film_count_samples(writer, pixel, 1u);
-    Sampler sampler =
-        make_sampler(make_pixel_sampler(px, py, task.scene.seed, task.scene.log2_samples), sample);
-    Vec2 lens_u = task.scene.has_lens ? sample_2d(sampler, 1) : Vec2{0.5f, 0.5f};
+    Sampler sampler = make_sampler(make_pixel_sampler(px, py, task.scene.seed, task.scene.log2_samples), sample);
+    Vec2 lens_u = task.scene.has_lens ? sample_2d(sampler, DIM_LENS) : Vec2{0.5f, 0.5f};
+    float time = SHUTTER_MIDDLE;
+    if (has_motion(task.scene)) task.wave.ray_time[i] = time = path_time(task.scene, sampler, py);
     PathState path;
-    task.wave.rays[i] = begin_path(task.scene, task.film, px, py, sample, sampler, sample_2d(sampler, 0), lens_u, path);
+    task.wave.rays[i] =
+        begin_path(task.scene, task.film, px, py, sample, sampler, sample_2d(sampler, DIM_PIXEL), lens_u, time, path);
     task.wave.ray_slot[i] = slot;
     task.wave.ray_kind[i] = path.visibility;
     store_path(task.wave, slot, path);

@@ -20,7 +20,7 @@ __device__ __forceinline__ Color shadow_transmittance(const RenderTask& task, co
         ShadePoints points;
         ClosureSet set;
         PointShader shader{task.scene.view, set};
-        OneRay tracer{trees};
+        OneRay tracer{trees, plan::MOTION && wave.shadow_time ? wave.shadow_time[k] : SHUTTER_MIDDLE};
         u64 steps = 0, rays = 0;
         MediumStack* stack = media ? wave.shadow_media + k : nullptr;
         Color through =

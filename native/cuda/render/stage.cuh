@@ -22,18 +22,20 @@ __device__ __forceinline__ void add_totals(const Wavefront& wave, const FilmWrit
     add_total(wave, TOTAL_CUT, writer.cut);
 }
 
-// media: around the ray's beginning; null without any.
-__device__ __forceinline__ void push_shadow(const Wavefront& wave, const Ray& ray, const ShadowRay& shadow,
+// time: of the path; media: around the ray's beginning; null without any.
+__device__ __forceinline__ void push_shadow(const Wavefront& wave, const Ray& ray, float time, const ShadowRay& shadow,
                                             const MediumStack* media) {
     u32 at = append(wave, WAVE_SHADOWS);
     wave.shadow_rays[at] = ray;
     wave.shadows[at] = shadow;
+    if (plan::MOTION && wave.shadow_time) wave.shadow_time[at] = time;
     if (plan::VOLUMES && media) wave.shadow_media[at] = *media;
 }
 
-__device__ __forceinline__ void push_ray(const Wavefront& wave, const Ray& ray, u32 slot, u32 kind) {
+__device__ __forceinline__ void push_ray(const Wavefront& wave, const Ray& ray, float time, u32 slot, u32 kind) {
     u32 at = append(wave, WAVE_NEXT_RAYS);
     wave.next_rays[at] = ray;
+    if (plan::MOTION && wave.next_time) wave.next_time[at] = time;
     wave.next_slot[at] = slot;
     wave.next_kind[at] = kind;
 }

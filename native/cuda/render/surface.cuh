@@ -6,13 +6,14 @@
 namespace luch {
 
 // The path goes on through a surface that is only the border of a volume.
-__device__ __noinline__ void pass_border(const RenderTask& task, PathState& path, u32 slot, const Hit& hit, Ray ray) {
+__device__ __noinline__ void pass_border(const RenderTask& task, PathState& path, u32 slot, const Hit& hit, float time,
+                                         Ray ray) {
     const Wavefront& wave = task.wave;
     path.travelled += hit.t;
     ray.t_min = 0.0f, ray.t_max = INFINITE_DISTANCE;
-    pass_surface(task.scene.view, wave.media[slot], hit, &ray);
+    pass_surface(task.scene.view, wave.media[slot], hit, time, &ray);
     store_path(wave, slot, path);
-    push_ray(wave, ray, slot, path.visibility);
+    push_ray(wave, ray, time, slot, path.visibility);
 }
 
 // entry: of the sorted queue. True when the surface was shaded.
@@ -26,7 +27,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
     const MaterialView& material = scene.view.materials[material_index];
     PathState path = load_path(wave, slot);
     if (plan::VOLUMES && material.only_volume) {
-        pass_border(task, path, slot, hit, ray);
+        pass_border(task, path, slot, hit, time_of_ray(wave, k), ray);
         return false;
     }
     FilmWriter writer = film_of_slot(task, slot);
@@ -37,8 +38,9 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
     ShadePoints points;
     ClosureSet set;
     points.count = 1;
-    SurfacePoint spawn = surface_point(scene.view, hit, ray);
-    setup_surface_lane(scene.view, surface_inputs(path, slot, hit, spawn, ray.direction), points, 0);
+    float time = time_of_ray(wave, k);
+    SurfacePoint spawn = surface_point(scene.view, hit, ray, time);
+    setup_surface_lane(scene.view, surface_inputs(path, slot, hit, spawn, ray.direction, time), points, 0);
     u32 aov_floats = 4u * task.film.layout.aov_count;
     float* aovs = wave.aovs ? wave.aovs + u64(entry) * aov_floats : nullptr;
     for (u32 i = 0; aovs && i < aov_floats; ++i) aovs[i] = 0.0f;
@@ -49,7 +51,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
             Ray ao_ray;
             ShadowRay ao;
             make_ao_ray(scene, path, slot, points, 0, set, spawn, &ao_ray, &ao);
-            push_shadow(wave, ao_ray, ao, media_of(wave, slot));
+            push_shadow(wave, ao_ray, time, ao, media_of(wave, slot));
         }
         bool inside = plan::SUBSURFACE && scene.has_subsurface && goes_inside(task, path, points, set, spawn, k);
         if (!inside) send_on(task, path, slot, points, set, spawn, ray.direction, hit.t);

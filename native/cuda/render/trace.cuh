@@ -4,6 +4,9 @@
 // warps fetch rays until there are none. That of the compressed wide tree has trace_closest_one and trace_any_one too,
 // for scenes that are one group in the world, and trace_closest_simple and trace_any_simple, which the race compares.
 #pragma once
+#ifndef LUCH_PLAN_MOTION
+#define LUCH_PLAN_MOTION 0  // one module serves many scenes; those in which something moves have another
+#endif
 #include "luch/accel/two_level.h"
 #include "rays/structure.cuh"
 
@@ -17,12 +20,16 @@ struct TraceTask {
     u8* blocked;  // of trace_any: Blocked values, by ray
     const u32* count;  // rays
     u32* next;  // 0 when the kernel begins; how many rays were fetched when it ends, at least
+    const float* times;  // of each ray; null: the shutter's middle. Read where LUCH_PLAN_MOTION is 1
 };
 
 __device__ __forceinline__ u32 ray_count(const TraceTask& task) { return __ldg(task.count); }
 __device__ __forceinline__ u32* next_ray(const TraceTask& task) { return task.next; }
 __device__ __forceinline__ u32 kinds_of(const TraceTask& task, u32 i) {
     return task.kinds ? __ldg(task.kinds + i) : u32(RAY_ALL);
+}
+__device__ __forceinline__ float time_of(const TraceTask& task, u32 i) {
+    return plan::MOTION && task.times ? __ldg(task.times + i) : SHUTTER_MIDDLE;
 }
 __device__ __forceinline__ Ray ray_of(const TraceTask& task, u32 i) {
     const float4* quads = reinterpret_cast<const float4*>(task.rays) + 2 * u64(i);
@@ -46,11 +53,15 @@ __device__ __forceinline__ void for_each_ray(const TraceTask& task, Trace&& trac
 
 template <Precision P, class View>
 __device__ __forceinline__ void trace_closest_simple(const TwoLevelView<View>& scene, const TraceTask& task) {
-    for_each_ray(task, [&](u32 i) { task.hits[i] = closest_hit<P>(scene, ray_of(task, i), kinds_of(task, i)); });
+    for_each_ray(task, [&](u32 i) {
+        task.hits[i] = closest_hit<P>(scene, ray_of(task, i), kinds_of(task, i), time_of(task, i));
+    });
 }
 template <Precision P, class View>
 __device__ __forceinline__ void trace_any_simple(const TwoLevelView<View>& scene, const TraceTask& task) {
-    for_each_ray(task, [&](u32 i) { task.blocked[i] = any_hit<P>(scene, ray_of(task, i), kinds_of(task, i)); });
+    for_each_ray(task, [&](u32 i) {
+        task.blocked[i] = any_hit<P>(scene, ray_of(task, i), kinds_of(task, i), time_of(task, i));
+    });
 }
 
 }  // namespace luch

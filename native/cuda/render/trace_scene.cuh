@@ -30,6 +30,20 @@ __device__ __forceinline__ Hit hit_of_entry(const TwoLevelView<Cwbvh>& scene, u3
     return hit_in_scene(scene.groups[entry.group], entry.instance, hit);
 }
 
+// Apart, so that their stacks and registers burden no other ray.
+template <Precision P>
+__device__ __noinline__ RefHit closest_moving(const MovingGroup& moving, const Ray& inside, float time, float t_max) {
+    NoCounters none;
+    RefHit found = {t_max, NONE, 0.0f, 0.0f};
+    closest_hit<P>(moving, inside, time, &found, none);
+    return found;
+}
+template <Precision P>
+__device__ __noinline__ u8 any_moving(const MovingGroup& moving, const Ray& inside, float time) {
+    NoCounters none;
+    return any_hit<P>(moving, inside, time, none);
+}
+
 template <Precision P, bool ANY>
 struct SceneWalker {
     using Kept = SceneAside<P>;
@@ -80,7 +94,16 @@ struct SceneWalker {
             const GroupEntry entry = load_quads(rays.scene.top.leaves + entries.first + bit);
             Ray ray = ray_of(rays.task, aside->index), inside;
             ray.t_min = aside->t_min;
-            if (!enter_entry(entry, ray, aside->kinds, aside->best.t, &inside)) continue;
+            float time = time_of(rays.task, aside->index);
+            if (!enter_entry(entry, ray, aside->kinds, aside->best.t, rays.scene.motion, time, &inside)) continue;
+            if (const MovingGroup* moving = moving_group_of(rays.scene, entry)) {
+                if (meet_moving(rays.scene, *moving, inside, time, entries.first + bit)) {
+                    entries.hits = 0;
+                    stack->size = 0;
+                    group.hits = 0;
+                }
+                continue;
+            }
             if (has_nodes(group)) stack->push(group);
             if (entries.hits != 0) stack->push(entries);
             const Cwbvh& tree = rays.scene.groups[entry.group].structure;
@@ -94,6 +117,22 @@ struct SceneWalker {
             group = {0, 0x80000000u};
             return;
         }
+    }
+    // One that changes its shape is walked at once, by this thread alone; true when nothing else can matter.
+    __device__ __forceinline__ bool meet_moving(const TwoLevelView<Cwbvh>& scene, const MovingGroup& moving,
+                                                const Ray& inside, float time, u32 entry) {
+        if constexpr (ANY) {
+            u8 found = any_moving<P>(moving, inside, time);
+            if (found) blocked = found;
+            return found == BLOCKED_OPAQUE;
+        }
+        RefHit best = aside->best, found = closest_moving<P>(moving, inside, time, best.t);
+        aside->entry = entry;
+        if (found.ref == NONE || !is_better(scene, found, best)) return false;
+        aside->best = found;
+        aside->best_entry = entry;
+        last = wide.upper(found.t);
+        return false;
     }
     // Visits the next child of the group, or takes its leaves; returns the primitives that the ray may hit.
     __device__ __forceinline__ WaitingGroup visit(const SceneRays& rays, SplitStack* stack) {

@@ -1,5 +1,8 @@
 // Under surfaces: walks, whose threads take the next as they end one, since some take hundreds of steps; and probes. No
 // shader program runs.
+#ifndef LUCH_PLAN_MOTION
+#define LUCH_PLAN_MOTION 0  // as in trace.cuh
+#endif
 #include "luch/accel/local_trees.h"
 #include "luch/integrator/wavefront.h"
 
@@ -12,8 +15,9 @@ inline constexpr int WALK_RESIDENT = 4;  // blocks a multiprocessor holds: 128 r
 
 struct LocalTracer {
     const LocalTreesView& trees;
+    float time;  // of the walk
     __device__ __forceinline__ Hit closest(u32 instance, const Ray& ray) const {
-        return closest_hit<Precision::LUCH_PRECISION>(trees, instance, ray);
+        return closest_hit<Precision::LUCH_PRECISION>(trees, instance, ray, time);
     }
 };
 
@@ -33,7 +37,7 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK, luch::WALK_RESIDE
     const Wavefront& wave = task.wave;
     u32 count = wave.counters[WAVE_WALKS], at = 0;
     u64 steps = 0;
-    LocalTracer tracer{*task.scene.local_trees};
+    LocalTracer tracer{*task.scene.local_trees, SHUTTER_MIDDLE};
     SubsurfaceWalk walk;
     WalkPlan plan;
     WalkFate fate = WalkFate::LOST;
@@ -44,6 +48,7 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK, luch::WALK_RESIDE
             if (at >= count) break;
             if (wave.walks[at].probe) continue;
             walk = wave.walks[at];
+            tracer.time = time_of_ray(wave, walk.ray);
             plan = begin_walk(walk);
             walking = true;
         }
@@ -63,7 +68,7 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK)
     u32 k = blockIdx.x * blockDim.x + threadIdx.x;
     if (k >= wave.counters[WAVE_WALKS] || !wave.walks[k].probe) return;
     SubsurfaceWalk walk = wave.walks[k];
-    LocalTracer tracer{*task.scene.local_trees};
+    LocalTracer tracer{*task.scene.local_trees, time_of_ray(wave, walk.ray)};
     u64 rays = 0;
     probe_disk(task.scene.view, walk, tracer, &rays);
     store_end(wave.walks + k, walk, WalkFate::LEAVES);

@@ -79,14 +79,20 @@ def ahead_name(module: str, precision: str, architecture: int) -> str:
     )
 
 
-def load(module: str, precision: str) -> Module:
-    """The module of kernels.json for the current device. Raises DeviceError if it does not compile."""
-    return _loaded(module, precision, int(cupy().cuda.Device().id))
+def load(module: str, precision: str, defines: tuple[str, ...] = ()) -> Module:
+    """The module of kernels.json for the current device. Raises DeviceError if it does not compile.
+
+    defines: what it is compiled with beside, as "-DNAME=1"; such a one is not there ahead of time.
+    """
+    return _loaded(module, precision, defines, int(cupy().cuda.Device().id))
 
 
 @functools.cache
-def _loaded(module: str, precision: str, device: int) -> Module:
+def _loaded(module: str, precision: str, defines: tuple[str, ...], device: int) -> Module:
     architecture = architecture_of(cupy())
+    if defines:
+        kept = kept_scene(module, precision, architecture, "", defines)
+        return Module(kept or compiled_scene(module, precision, architecture, "", defines))
     return Module(ahead(module, precision, architecture) or compiled(module, precision, architecture))
 
 

@@ -34,6 +34,7 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "HOLDOUT": ("holdout",),
     "CLAMPING": ("clamping",),
     "VOLUMES": ("volumes",),
+    "MOTION": ("camera motion", "object motion", "deformation motion"),
 }  # fmt: skip
 # Define -> what the core says of the scene as it will be rendered (core.render.Renderer.device_facts).
 TOLD = {

@@ -19,7 +19,7 @@ from luch._native import core
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.scene_kernels import SceneKernels
-from luch.cuda.trace import Left, SceneTracer, TreesTooDeep
+from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
 from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, too_large
 
 BLOCK = 128  # STAGE_BLOCK of render/stage.cuh
@@ -44,8 +44,10 @@ TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transpar
 class Memory:
     """The film and the wavefront on the device, and their places in the RenderTask."""
 
-    def __init__(self, task: bytes, pixels: int, materials: int, paths: int, walks: bool, media: bool) -> None:
-        """walks: paths may go under surfaces; media: and through volumes."""
+    def __init__(
+        self, task: bytes, pixels: int, materials: int, paths: int, walks: bool, media: bool, moves: bool
+    ) -> None:
+        """walks: paths may go under surfaces; media: and through volumes; moves: at times of their own."""
         cp, fields, sizes = cupy(), core.render.task_fields(), core.render.task_sizes()
         self._fields, self._task = fields, bytearray(task)
         stride = self.field("film.layout.stride", "<I")
@@ -82,6 +84,12 @@ class Memory:
         }
         if walks:
             self.arrays["walks"] = empty(slots * sizes["walk"])
+        if moves:
+            self.arrays |= {
+                "ray_time": empty(slots, np.float32),
+                "next_time": empty(slots, np.float32),
+                "shadow_time": empty(slots * shadows, np.float32),
+            }
         if aovs:
             self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
         if media:
@@ -96,7 +104,7 @@ class Memory:
         for name, array in self.arrays.items():
             self._set(f"wave.{name}", "<Q", array.data.ptr)
         self.tasks = [bytes(self._task), b""]
-        for name in ("rays", "slot", "kind"):
+        for name in ("rays", "slot", "kind", *(("time",) if moves else ())):
             own, following = ("rays", "next_rays") if name == "rays" else (f"ray_{name}", f"next_{name}")
             self._set(f"wave.{own}", "<Q", self.arrays[following].data.ptr)
             self._set(f"wave.{following}", "<Q", self.arrays[own].data.ptr)
@@ -111,8 +119,8 @@ class Memory:
         struct.pack_into(kind, self._task, self._fields[name], value)
 
     def address(self, name: str) -> int:
-        """Of an array on the device."""
-        return int(self.arrays[name].data.ptr)
+        """Of an array on the device; 0 if this scene needs no such array."""
+        return int(self.arrays[name].data.ptr) if name in self.arrays else 0
 
     def counter(self, name: str) -> int:
         """Address of one of WaveCounter."""
@@ -147,13 +155,14 @@ def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
         first += count
 
 
-def bytes_per_path(stride: int, pixels: int, walks: bool = False, media: bool = False) -> float:
+def bytes_per_path(stride: int, pixels: int, walks: bool = False, media: bool = False, moves: bool = False) -> float:
     """Device memory of one path under way: its state, its queues, and its part of a layer of the film."""
     sizes = core.render.task_sizes()
     shadow = sizes["ray"] + sizes["shadow"] + 5 + media * sizes["media"]
     queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + (2 + walks + media) * shadow
     beside = walks * sizes["walk"] + media * sizes["media"]
-    return float(sizes["path"] + queues + beside + 8 * stride + 4)
+    times = 4 * (4 + walks + media) * moves
+    return float(sizes["path"] + queues + beside + times + 8 * stride + 4)
 
 
 def _told_images(sizes: list[int]) -> list[str]:
@@ -240,11 +249,15 @@ class DeviceRenderer:
         self._upload_seconds = time.perf_counter() - began
         self._paths = load("RENDER_PATHS", self._scene.settings.precision)
         self._stages = SceneKernels(facts, blocks, self._scene)
-        self._walks = load("RENDER_WALKS", self._scene.settings.precision) if facts["subsurface"] else None
+        self._walks = (
+            load("RENDER_WALKS", self._scene.settings.precision, MOVING * facts["moves"])
+            if facts["subsurface"]
+            else None
+        )
         self._media = facts["media"] and self._stages.plan["VOLUMES"]
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
-        self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]))
+        self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]), facts["moves"])
         return not self._cancelled
 
     def _upload(self) -> tuple[dict[str, Any], Blocks]:
@@ -254,7 +267,7 @@ class DeviceRenderer:
         self._arrays = DeviceCopy(blocks, links, left_images)
         self.warnings = _told_images([len(blocks[number][1]) for number in left_images])
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
-                                   facts["one_group"], left, depth)  # fmt: skip
+                                   facts["one_group"], left, depth, facts["trees_move"])  # fmt: skip
         return facts, blocks
 
     def _images_to_leave(self, blocks: Blocks, tree_blocks: Blocks, left: Left) -> set[int]:
@@ -269,19 +282,21 @@ class DeviceRenderer:
         budget = self._scene.settings.texture_memory
         return images_to_leave(blocks, min(room, int(budget * 1e6)) if budget > 0 else room)
 
-    def _allocate(self, pixels: int, materials: int) -> Memory:
+    def _allocate(self, pixels: int, materials: int, moves: bool) -> Memory:
         """As large a wavefront as the device's memory allows, up to MOST_PATHS."""
         cp = cupy()
         free, _ = cp.cuda.runtime.memGetInfo()
         fields, root = core.render.task_fields(), self._arrays.root
         stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
         walks, media = self._walks is not None, self._media
-        fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels, walks, media))
+        fits = int(
+            (free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels, walks, media, moves)
+        )
         samples = max(1, self._scene.settings.samples)
         paths = min(MOST_PATHS, fits, pixels * samples)
         while paths >= min(FEWEST_PATHS, pixels):
             try:
-                return Memory(root, pixels, materials, paths, walks, media)
+                return Memory(root, pixels, materials, paths, walks, media, moves)
             except cp.cuda.memory.OutOfMemoryError:
                 cp.get_default_memory_pool().free_all_blocks()
                 paths //= 2
@@ -343,7 +358,8 @@ class DeviceRenderer:
         following = "next_" if turn else ""
         own_rays = memory.address(f"{following}rays")
         kinds = memory.address("next_kind" if turn else "ray_kind")
-        self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"), memory.counter("traced"))
+        self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"), memory.counter("traced"),
+                             memory.address("next_time" if turn else "ray_time"))  # fmt: skip
         if self._media:
             self._launch(stages.kernel("cross_media"), turn, rays)
         self._launch(stages.kernel("find_light"), turn, rays)
@@ -359,7 +375,8 @@ class DeviceRenderer:
         shadows = memory.count("shadows")
         if shadows:
             self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"), memory.address("blocked"),
-                             memory.counter("shadows"), memory.counter("shadowed"))  # fmt: skip
+                             memory.counter("shadows"), memory.counter("shadowed"),
+                             memory.address("shadow_time"))  # fmt: skip
             self._launch(stages.kernel("add_shadows"), turn, shadows, self._tracer.root)
         self._launch(paths.kernel("next_round"), turn, 1)
         return shadows

@@ -14,6 +14,7 @@ from luch.cuda.device import DeviceError, Kernel, cupy
 from luch.cuda.upload import Blocks, DeviceCopy, Links
 
 BLOCK = 128  # RAY_BLOCK of rays/structure.cuh
+MOVING = ("-DLUCH_PLAN_MOTION=1",)
 HIT = np.dtype([("t", "<f4"), ("prim", "<i4"), ("instance", "<i4"), ("u", "<f4"), ("v", "<f4")])  # luch::Hit; -1: NONE
 
 
@@ -48,13 +49,14 @@ class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
     def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, one_group: bool, left: Left = (),
-                 depth: int = 0) -> None:  # fmt: skip
+                 depth: int = 0, moves: bool = False) -> None:  # fmt: skip
         """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for.
 
-        left: groups that the device builds, if any; depth: of the trees that were built. May raise TreesTooDeep.
+        left: groups that the device builds, if any; depth: of the trees that were built; moves: something in them does.
+        May raise TreesTooDeep.
         """
         self._trees = upload_trees(blocks, links, left, depth)
-        self._module = load(f"TRACE_{kind}", precision)
+        self._module = load(f"TRACE_{kind}", precision, MOVING if moves else ())
         one = "_one" if one_group and kind == "CWBVH" else ""
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
 
@@ -72,38 +74,44 @@ class SceneTracer:
         """One of the module's."""
         return self._module.kernel(name)
 
-    def closest(self, rays: int, kinds: int, hits: int, count: int, following: int) -> None:
+    def closest(self, rays: int, kinds: int, hits: int, count: int, following: int, times: int = 0) -> None:
         """Puts it on the current stream. All are addresses on the device.
 
         rays: 32 bytes each (luch::Ray), 16 bytes aligned; kinds: uint32 each, or 0; hits: HIT each; count: uint32, how
-        many; following: uint32, must be 0 when the kernel begins.
+        many; following: uint32, must be 0 when the kernel begins; times: float32 each, or 0.
         """
-        self._launch(self._closest, rays, kinds, hits, 0, count, following)
+        self._launch(self._closest, rays, kinds, hits, 0, count, following, times)
 
-    def any(self, rays: int, kinds: int, blocked: int, count: int, following: int) -> None:
+    def any(self, rays: int, kinds: int, blocked: int, count: int, following: int, times: int = 0) -> None:
         """As above. blocked: uint8 each, luch::Blocked."""
-        self._launch(self._any, rays, kinds, 0, blocked, count, following)
+        self._launch(self._any, rays, kinds, 0, blocked, count, following, times)
 
     def _launch(self, kernel: Kernel, *task: int) -> None:
-        kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, [self._trees.root, struct.pack("<6Q", *task)])
+        kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, [self._trees.root, struct.pack("<7Q", *task)])
 
-    def closest_of(self, rays: Any, kinds: Any = None, kernel: str = "") -> Any:
-        """rays (N, 8) float32, kinds (N,) uint32 or None: NumPy in, HIT (N,) out. For tests and races."""
-        results, run = self.launcher(self.kernel(kernel) if kernel else self._closest, rays, kinds)
+    def closest_of(self, rays: Any, kinds: Any = None, kernel: str = "", times: Any = None) -> Any:
+        """rays (N, 8) float32, kinds (N,) uint32 or None, times (N,) float32 or None: NumPy in, HIT (N,) out.
+
+        For tests and races.
+        """
+        results, run = self.launcher(self.kernel(kernel) if kernel else self._closest, rays, kinds, times)
         run()
         return cupy().asnumpy(results).view(HIT)
 
-    def any_of(self, rays: Any, kinds: Any = None, kernel: str = "") -> Any:
+    def any_of(self, rays: Any, kinds: Any = None, kernel: str = "", times: Any = None) -> Any:
         """As above; Blocked values (N,) uint8."""
-        results, run = self.launcher(self.kernel(kernel) if kernel else self._any, rays, kinds)
+        results, run = self.launcher(self.kernel(kernel) if kernel else self._any, rays, kinds, times)
         run()
         return cupy().asnumpy(results)
 
-    def launcher(self, kernel: Kernel, rays: Any, kinds: Any = None) -> tuple[Any, Callable[[], None]]:
+    def launcher(
+        self, kernel: Kernel, rays: Any, kinds: Any = None, times: Any = None
+    ) -> tuple[Any, Callable[[], None]]:
         """The results' bytes on the device, and what traces the rays into them, again and again."""
         cp, blocked = cupy(), kernel.name.startswith("trace_any")
         rays = cp.asarray(rays)
         kinds = None if kinds is None or not len(kinds) else cp.asarray(kinds)
+        times = None if times is None else cp.asarray(times)
         results = cp.zeros(len(rays) * (1 if blocked else HIT.itemsize), np.uint8)
         counts = cp.asarray(np.array([len(rays), 0], np.uint32))
 
@@ -111,6 +119,6 @@ class SceneTracer:
             counts[1:] = 0
             outputs = (0, results.data.ptr) if blocked else (results.data.ptr, 0)
             self._launch(kernel, rays.data.ptr, 0 if kinds is None else kinds.data.ptr, *outputs, counts.data.ptr,
-                         counts.data.ptr + 4)  # fmt: skip
+                         counts.data.ptr + 4, 0 if times is None else times.data.ptr)  # fmt: skip
 
         return results, run

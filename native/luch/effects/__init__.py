@@ -16,6 +16,7 @@ from dataclasses import replace
 
 from luch.effects.forcing import check, force
 from luch.effects.lights import add_lights
+from luch.effects.motion import add_motion
 from luch.effects.picture import add_camera, add_film, add_geometry, add_later, add_paths
 from luch.effects.removal import without
 from luch.effects.shown import look_at
@@ -55,6 +56,7 @@ def _found(scene: Scene) -> Effects:
     add_textures(effects, shown)
     add_lights(effects, shown)
     add_camera(effects, shown)
+    add_motion(effects, shown)
     add_geometry(effects, shown)
     add_volumes(effects, shown)
     add_paths(effects, shown)

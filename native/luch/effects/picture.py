@@ -24,7 +24,6 @@ _COUNTS_BYTES = 4  # samples of a pixel
 
 # What the exporter meets and Luch cannot draw: effect, group, why it is off where nothing was met.
 _LATER = (
-    ("motion blur", "Camera", "the scene asks for no motion blur"),
     ("stereoscopy", "Camera", "the scene is not stereoscopic"),
     ("hair", "Geometry", "the scene has none"),
     ("heterogeneous volumes", "Geometry", "no volume changes from place to place"),
@@ -197,6 +196,7 @@ def add_later(effects: Effects, shown: Shown) -> None:
     """What the exporter met and Luch does not draw yet, in the exporter's own words."""
     told = dict(shown.scene.unsupported)
     told.pop("subsurface", None)  # told with the surfaces
+    told.pop("motion blur", None)  # told with what moves
     for name, group, off in _LATER:
         _add_missing(effects, group, name, told.pop(name, []), off)
     for name, sentences in told.items():

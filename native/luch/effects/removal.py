@@ -122,6 +122,14 @@ def _unsampled_world(scene: Scene) -> Scene:
     return replace(scene, world=scene.world and replace(scene.world, sampling="NONE"))
 
 
+def _still_objects(scene: Scene) -> Scene:
+    return replace(scene, instances=scene.instances and replace(scene.instances, motion=None))
+
+
+def _still_shapes(scene: Scene) -> Scene:
+    return replace(scene, meshes=[replace(m, motion_positions=None, motion_normals=None) for m in scene.meshes])
+
+
 def _no_pass(prefix: str) -> Callable[[Scene], Scene]:
     def apply(scene: Scene) -> Scene:
         left = [name for name in scene.film.passes if not name.startswith(prefix)]
@@ -133,6 +141,7 @@ def _no_pass(prefix: str) -> Callable[[Scene], Scene]:
 _OPAQUE = {"CLOSURE_PRINCIPLED": ("transmission_weight",)}
 _FILMS = ("CLOSURE_PRINCIPLED", "CLOSURE_METALLIC", "CLOSURE_GLASS")
 _BLACK = "black"
+_MIDDLE = "it stands still as it is in the shutter's middle"
 _NOT_STORED = "the pass is not there"
 _PASSES = (
     "Depth", "Mist", "Position", "Normal", "UV", "Object Index", "Material Index", "Diffuse Direct",
@@ -194,6 +203,9 @@ REMOVALS: dict[str, Removal] = {
     "procedural world": Removal("darkness", _no_world),
     "world light sampling": Removal("the world is found by chance alone", _unsampled_world),
     "depth of field": Removal("everything is in focus", _camera(use_dof=False)),
+    "camera motion": Removal(_MIDDLE, _camera(motion=None)),
+    "object motion": Removal(_MIDDLE, _still_objects),
+    "deformation motion": Removal(_MIDDLE, _still_shapes),
     "aperture blades": Removal("a round aperture", _camera(blades=0)),
     "point clouds": Removal(
         "nothing", lambda scene: replace(scene, meshes=[replace(mesh, spheres=None) for mesh in scene.meshes])

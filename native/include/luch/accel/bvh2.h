@@ -59,15 +59,15 @@ LUCH_FN void walk(const Bvh2& tree, const BoxRay& ray, float t_min, Leaf& leaf, 
     }
 }
 
-template <Precision P, class Count>
-LUCH_FN void closest_hit(const Bvh2& tree, const Primitives& all, const Ray& ray, RefHit* best, Count& count) {
-    ClosestInLeaf<P, Count> leaf = {all, tree.refs, PrimitiveRay<P>(ray), ray.t_min, best, count};
+template <Precision P, class All, class Count>
+LUCH_FN void closest_hit(const Bvh2& tree, const All& all, const Ray& ray, RefHit* best, Count& count) {
+    ClosestInLeaf<P, Count, All> leaf = {all, tree.refs, PrimitiveRay<P>(ray), ray.t_min, best, count};
     walk(tree, slab_ray<P>(ray, tree.root), ray.t_min, leaf, count);
 }
 
-template <Precision P, class Count>
-LUCH_FN u8 any_hit(const Bvh2& tree, const Primitives& all, const Ray& ray, Count& count) {
-    AnyInLeaf<P, Count> leaf = {all, tree.refs, PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count};
+template <Precision P, class All, class Count>
+LUCH_FN u8 any_hit(const Bvh2& tree, const All& all, const Ray& ray, Count& count) {
+    AnyInLeaf<P, Count, All> leaf = {all, tree.refs, PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count};
     walk(tree, slab_ray<P>(ray, tree.root), ray.t_min, leaf, count);
     return leaf.blocked;
 }

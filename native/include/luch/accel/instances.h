@@ -26,7 +26,7 @@ struct alignas(16) GroupEntry {
     u32 group;
     u32 instance;    // NONE: the group is in world space
     u32 visibility;  // RayKind bits
-    u32 unused;
+    u32 motion;      // 0: it stands still; else see moving.h
 };
 static_assert(sizeof(GroupEntry) == 64);
 

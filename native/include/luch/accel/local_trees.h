@@ -3,32 +3,48 @@
 #pragma once
 #include "luch/accel/cwbvh.h"
 #include "luch/accel/instances.h"
+#include "luch/accel/moving.h"
+#include "luch/plan.h"
 
 namespace luch {
 
 struct alignas(16) LocalTreeEntry {
     Affine to_object;
-    u32 tree;  // NONE: nothing to hit
+    u32 tree;    // NONE: nothing to hit
+    u32 motion;  // as GroupEntry's
 };
 
 struct LocalTreesView {
     const LocalTreeEntry* entries;  // per instance
     const Cwbvh* trees;             // of meshes; a ref is the triangle's number
+    const TraceMotion* motion;      // null: nothing moves
 };
 
-// The nearest hit in the instance; t of a miss is infinite.
+// A ray of the scene in an instance, its interval not yet set, or false.
+LUCH_FN bool enter_local(const LocalTreeEntry& entry, const TraceMotion* motion, const Ray& ray, float time,
+                         Ray* inside) {
+    if (entry.tree == NONE || !ray_is_valid(ray)) return false;
+    if (plan::MOTION && entry.motion != 0u) return enter_moving(*motion, entry, ray, time, inside);
+    return enter_instance(entry.to_object, ray, inside);
+}
+
+// The nearest hit in the instance as it is at that time; t of a miss is infinite.
 template <Precision P>
-LUCH_FN Hit closest_hit(const LocalTreesView& view, u32 instance, const Ray& given) {
+LUCH_FN Hit closest_hit(const LocalTreesView& view, u32 instance, const Ray& given, float time = SHUTTER_MIDDLE) {
     const LocalTreeEntry entry = view.entries[instance];
     Ray ray = given, inside;
-    if (entry.tree == NONE || !ray_is_valid(ray) || !enter_instance(entry.to_object, ray, &inside))
-        return no_scene_hit();
+    if (!enter_local(entry, view.motion, ray, time, &inside)) return no_scene_hit();
     inside.t_min = max_f(ray.t_min, 0.0f);
     inside.t_max = min_f(ray.t_max, LARGEST_DISTANCE);
     RefHit found = {inside.t_max, NONE, 0.0f, 0.0f};
     NoCounters none;
-    LocalStack<> stack;
-    closest_hit<P>(view.trees[entry.tree], inside, stack, &found, none);
+    const MovingGroup* moving = plan::MOTION && entry.motion != 0u ? moving_group(*view.motion, entry) : nullptr;
+    if (moving) {
+        closest_hit<P>(*moving, inside, time, &found, none);
+    } else {
+        LocalStack<> stack;
+        closest_hit<P>(view.trees[entry.tree], inside, stack, &found, none);
+    }
     if (found.ref == NONE) return no_scene_hit();
     return {found.t, found.ref, instance, found.u, found.v};
 }

@@ -114,9 +114,9 @@ LUCH_FN Box primitive_box(const Primitives& all, u32 ref) {
 
 LUCH_FN bool is_closer(float t, u32 ref, const RefHit& best) { return t < best.t || (t == best.t && ref < best.ref); }
 
-// Tests one primitive and keeps it if it is the better hit.
-template <Precision P, class Count>
-LUCH_FN void offer_primitive(const Primitives& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, RefHit* best,
+// Tests one primitive and keeps it if it is the better hit. All: Primitives, or triangles that move (moving.h).
+template <Precision P, class All, class Count>
+LUCH_FN void offer_primitive(const All& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, RefHit* best,
                              Count& count) {
     TriangleHit hit;
     if (test_primitive(all, ray, ref, t_min, best->t, &hit, count) && is_closer(hit.t, ref, *best))
@@ -124,9 +124,9 @@ LUCH_FN void offer_primitive(const Primitives& all, const PrimitiveRay<P>& ray, 
 }
 
 // Tests one primitive for a shadow ray; true when nothing else can matter.
-template <Precision P, class Count>
-LUCH_FN bool block_primitive(const Primitives& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, float t_max,
-                             u8* blocked, Count& count) {
+template <Precision P, class All, class Count>
+LUCH_FN bool block_primitive(const All& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, float t_max, u8* blocked,
+                             Count& count) {
     TriangleHit hit;
     if (!test_primitive(all, ray, ref, t_min, t_max, &hit, count)) return false;
     bool maybe = all.flags && (all.flags[ref] & PRIMITIVE_MAY_BE_TRANSPARENT);

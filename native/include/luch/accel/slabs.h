@@ -34,9 +34,9 @@ LUCH_FN bool enter_box(const BoxRay& ray, const float* lo, const float* hi, floa
 }
 
 // What a traversal does with a leaf's refs: keep the better hit, or stop at the first that blocks.
-template <Precision P, class Count>
+template <Precision P, class Count, class All = Primitives>
 struct ClosestInLeaf {
-    const Primitives& all;
+    const All& all;
     const u32* refs;
     PrimitiveRay<P> ray;
     float t_min;
@@ -50,9 +50,9 @@ struct ClosestInLeaf {
         return false;
     }
 };
-template <Precision P, class Count>
+template <Precision P, class Count, class All = Primitives>
 struct AnyInLeaf {
-    const Primitives& all;
+    const All& all;
     const u32* refs;
     PrimitiveRay<P> ray;
     float t_min, limit;

@@ -3,6 +3,8 @@
 #pragma once
 #include "luch/accel/cwbvh.h"
 #include "luch/accel/instances.h"
+#include "luch/accel/moving.h"
+#include "luch/plan.h"
 
 namespace luch {
 
@@ -24,6 +26,7 @@ struct TwoLevelView {
     TracedGroup<Structure> only;           // the one group in the world that is all of the scene,
     u32 only_visibility;                   // by RayKind; 0: take the top
     u32 group_count;
+    const TraceMotion* motion;             // null: nothing moves
 };
 
 template <class Structure>
@@ -32,13 +35,17 @@ LUCH_FN Hit hit_in_scene(const TracedGroup<Structure>& group, u32 instance, cons
     return {hit.t, member.prim_of(hit.ref), instance == NONE ? member.instance : instance, hit.u, hit.v};
 }
 
-// A ray of the scene in an entry's group, or false.
-LUCH_FN bool enter_entry(const GroupEntry& entry, const Ray& ray, u32 kinds, float t_max, Ray* inside) {
+// A ray of the scene in an entry's group, or false. motion, time: read where the entry moves.
+LUCH_FN bool enter_entry(const GroupEntry& entry, const Ray& ray, u32 kinds, float t_max, const TraceMotion* motion,
+                         float time, Ray* inside) {
     if (!(entry.visibility & kinds)) return false;
-    if (entry.instance == NONE)
+    if (entry.instance == NONE) {
         *inside = ray;
-    else if (!enter_instance(entry.to_object, ray, inside))
+    } else if (plan::MOTION && entry.motion != 0u) {
+        if (!enter_moving(*motion, entry, ray, time, inside)) return false;
+    } else if (!enter_instance(entry.to_object, ray, inside)) {
         return false;
+    }
     inside->t_min = ray.t_min;
     inside->t_max = t_max;
     return true;
@@ -57,20 +64,30 @@ LUCH_FN WideRay top_ray(const TwoLevelView<Structure>& scene, const Ray& ray) {
     return make_wide_ray(ray, scene.top.root, widening(scene.error, ray.origin));
 }
 
+// The group of an entry whose mesh changes its shape.
+template <class Structure>
+LUCH_FN const MovingGroup* moving_group_of(const TwoLevelView<Structure>& scene, const GroupEntry& entry) {
+    return plan::MOTION && entry.motion != 0u ? moving_group(*scene.motion, entry) : nullptr;
+}
+
 template <Precision P, class Structure>
 struct ClosestOfEntries {
     const TwoLevelView<Structure>& scene;
     const Ray& ray;
     u32 kinds;
+    float time;
     Hit best;
     LUCH_FN float t_max() const { return best.t; }
     LUCH_FN bool operator()(const GroupEntry& entry) {
         Ray inside;
-        if (!enter_entry(entry, ray, kinds, best.t, &inside)) return false;
+        if (!enter_entry(entry, ray, kinds, best.t, scene.motion, time, &inside)) return false;
         const TracedGroup<Structure>& group = scene.groups[entry.group];
         NoCounters none;
         RefHit found = {best.t, NONE, 0.0f, 0.0f};
-        closest_hit<P>(group.structure, group.primitives, inside, &found, none);
+        if (const MovingGroup* moving = moving_group_of(scene, entry))
+            closest_hit<P>(*moving, inside, time, &found, none);
+        else
+            closest_hit<P>(group.structure, group.primitives, inside, &found, none);
         if (found.ref == NONE) return false;
         Hit hit = hit_in_scene(group, entry.instance, found);
         if (comes_first(hit, best)) best = hit;
@@ -82,21 +99,26 @@ struct AnyOfEntries {
     const TwoLevelView<Structure>& scene;
     const Ray& ray;
     u32 kinds;
+    float time;
     u8 blocked;
     LUCH_FN float t_max() const { return ray.t_max; }
     LUCH_FN bool operator()(const GroupEntry& entry) {
         Ray inside;
-        if (!enter_entry(entry, ray, kinds, ray.t_max, &inside)) return false;
+        if (!enter_entry(entry, ray, kinds, ray.t_max, scene.motion, time, &inside)) return false;
         const TracedGroup<Structure>& group = scene.groups[entry.group];
         NoCounters none;
-        if (u8 found = any_hit<P>(group.structure, group.primitives, inside, none)) blocked = found;
+        const MovingGroup* moving = moving_group_of(scene, entry);
+        u8 found = moving ? any_hit<P>(*moving, inside, time, none)
+                          : any_hit<P>(group.structure, group.primitives, inside, none);
+        if (found) blocked = found;
         return blocked == BLOCKED_OPAQUE;
     }
 };
 
-// The ray as it stands in the scene; it sees the instances that share a bit with kinds.
+// The ray as it stands in the scene; it sees the instances that share a bit with kinds, as they are at `time`.
 template <Precision P, class Structure>
-LUCH_FN Hit closest_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 kinds) {
+LUCH_FN Hit closest_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 kinds,
+                        float time = SHUTTER_MIDDLE) {
     Ray ray = given;
     if (!clamp_interval(&ray)) return no_scene_hit();
     NoCounters none;
@@ -106,7 +128,7 @@ LUCH_FN Hit closest_hit(const TwoLevelView<Structure>& scene, const Ray& given, 
             closest_hit<P>(scene.only.structure, scene.only.primitives, ray, &found, none);
         return found.ref == NONE ? no_scene_hit() : hit_in_scene(scene.only, NONE, found);
     }
-    ClosestOfEntries<P, Structure> entries = {scene, ray, kinds, {ray.t_max, NONE, NONE, 0.0f, 0.0f}};
+    ClosestOfEntries<P, Structure> entries = {scene, ray, kinds, time, {ray.t_max, NONE, NONE, 0.0f, 0.0f}};
     LocalStack<> stack;
     walk(scene.top, top_ray(scene, ray), stack, entries, none);
     return entries.best.prim == NONE ? no_scene_hit() : entries.best;
@@ -114,7 +136,7 @@ LUCH_FN Hit closest_hit(const TwoLevelView<Structure>& scene, const Ray& given, 
 
 // A Blocked value.
 template <Precision P, class Structure>
-LUCH_FN u8 any_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 kinds) {
+LUCH_FN u8 any_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 kinds, float time = SHUTTER_MIDDLE) {
     Ray ray = given;
     if (!clamp_interval(&ray)) return BLOCKED_NOT;
     NoCounters none;
@@ -122,7 +144,7 @@ LUCH_FN u8 any_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 k
         if (!(scene.only_visibility & kinds)) return BLOCKED_NOT;
         return any_hit<P>(scene.only.structure, scene.only.primitives, ray, none);
     }
-    AnyOfEntries<P, Structure> entries = {scene, ray, kinds, BLOCKED_NOT};
+    AnyOfEntries<P, Structure> entries = {scene, ray, kinds, time, BLOCKED_NOT};
     LocalStack<> stack;
     walk(scene.top, top_ray(scene, ray), stack, entries, none);
     return entries.blocked;

@@ -71,15 +71,16 @@ LUCH_FN SurfacePoint sphere_point(const Sphere& sphere, const Ray& ray, const Af
     return point;
 }
 
-// ray: the one that found the hit, world.
-LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit, const Ray& ray) {
-    const InstanceView& instance = scene.instances[hit.instance];
+// ray: the one that found the hit, world; time: that it was traced at.
+LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit, const Ray& ray, float time) {
+    InstanceView moved;
+    const InstanceView& instance = instance_at_time(scene, hit.instance, time, &moved);
     const MeshView& mesh = scene.meshes[instance.mesh];
     if (is_sphere(mesh, hit.prim)) {
         const float* s = sphere_at(scene, mesh, hit.prim);
         return sphere_point({{s[0], s[1], s[2]}, s[3]}, ray, instance.to_world, instance.to_object);
     }
-    Triangle t = triangle_at(scene, mesh, hit.prim);
+    Triangle t = triangle_at(scene, instance, hit.prim, time);
     return triangle_point(t.p[0], t.p[1], t.p[2], hit.u, hit.v, instance.to_world, instance.to_object);
 }
 

@@ -7,13 +7,27 @@ namespace luch {
 // Row of the film for a pixel of the full frame.
 LUCH_FN u32 film_pixel(const FilmView& film, u32 x, u32 y) { return (y - film.y0) * film.width + (x - film.x0); }
 
-// px, py: pixel of the full frame. filter_u, lens_u: the sampler's dimensions 0 and 1 (lens_u unused without a lens).
+// When a path of this line of pixels sees the scene; only where something moves. Time is the third coordinate of the
+// place in the pixel, which stays what it is: an edge that moves slowly is a plane among the three, and comes
+// out with a quarter less error than by a dimension apart (64 samples, measured).
+LUCH_FN float path_time(const RenderView& scene, const Sampler& sampler, u32 py) {
+    return shutter_time(*scene.shutter, sample_3d(sampler, DIM_PIXEL).z, py, static_cast<u32>(scene.view.frame_size.y));
+}
+
+LUCH_FN CameraRay camera_ray(const RenderView& scene, Vec2 raster, Vec2 lens_u, float time) {
+    if (!has_motion(scene) || (scene.shutter->camera_keys == 0u && !scene.shutter->zooms))
+        return generate_ray(scene.camera, raster, lens_u);
+    return generate_ray(camera_at_time(scene.camera, *scene.shutter, time), raster, lens_u);
+}
+
+// px, py: pixel of the full frame. filter_u, lens_u: the sampler's dimensions DIM_PIXEL and DIM_LENS (lens_u unused
+// without a lens); time: unused without motion.
 LUCH_FN Ray begin_path(const RenderView& scene, const FilmView& film, u32 px, u32 py, u32 sample,
-                       const Sampler& sampler, Vec2 filter_u, Vec2 lens_u, PathState& path) {
+                       const Sampler& sampler, Vec2 filter_u, Vec2 lens_u, float time, PathState& path) {
     Vec2 offset = sample_filter(*scene.filter, filter_u);
     CameraRay camera =
-        generate_ray(scene.camera, {static_cast<float>(px) + 0.5f + offset.x, static_cast<float>(py) + 0.5f + offset.y},
-                     scene.has_lens ? lens_u : Vec2{0.5f, 0.5f});
+        camera_ray(scene, {static_cast<float>(px) + 0.5f + offset.x, static_cast<float>(py) + 0.5f + offset.y},
+                   scene.has_lens ? lens_u : Vec2{0.5f, 0.5f}, time);
     path = PathState{};
     path.sampler = sampler;
     path.sample = sample - scene.first_sample;

@@ -26,19 +26,20 @@ LUCH_FN bool choose_light(const RenderView& scene, const PathState& path, const 
                           const ClosureSet& set, Vec3 u, LightSample* s) {
     if (set.count == 0 || !has_smooth_lobe(set)) return false;
     *s = sample_light(scene.view, lane_position(points, lane), lane_normal(points, lane), set_transmits(set), u.z,
-                      {u.x, u.y});
+                      {u.x, u.y}, lane_time(points, lane));
     if (s->kind == EmitterKind::NONE_ || !(s->pdf_sa > 0.0f)) return false;
     return !light_is_spent(*scene.view.lights, *s, path.bounce);
 }
 
-LUCH_FN ConstantEmission emission_of(const RenderView& scene, const LightSample& s) {
+LUCH_FN ConstantEmission emission_of(const RenderView& scene, const LightSample& s, float time) {
     if (s.kind == EmitterKind::LAMP)
         return {!scene.view.lights->lamps[s.lamp].has_program, {1.0f, 1.0f, 1.0f}, false, {}};
     if (s.kind == EmitterKind::WORLD) return scene.world_emission;
     ConstantEmission emission = scene.material_emission[material_at(scene.view, s.instance, s.prim)];
     if (emission.by_side) {  // the side as setup_surface_lane tells it
-        const InstanceView& instance = scene.view.instances[s.instance];
-        Vec3 ng = world_face_normal(instance, triangle_at(scene.view, scene.view.meshes[instance.mesh], s.prim));
+        InstanceView moved;
+        const InstanceView& instance = instance_at_time(scene.view, s.instance, time, &moved);
+        Vec3 ng = world_face_normal(instance, triangle_at(scene.view, instance, s.prim, time));
         if (dot(ng, -s.direction) < 0.0f) emission.radiance = emission.behind;
     }
     return emission;
@@ -50,9 +51,9 @@ LUCH_FN const Program& program_of(const RenderView& scene, const LightSample& s)
     return scene.view.materials[material_at(scene.view, s.instance, s.prim)].program;
 }
 
-// What the light's program reads at the sampled place. footprint: at the shaded point.
+// What the light's program reads at the sampled place. footprint, time: at the shaded point.
 LUCH_FN void setup_light_lane(const RenderView& scene, const PathState& path, u32 path_index, const LightSample& s,
-                              float footprint, ShadePoints& points, int lane) {
+                              float footprint, float time, ShadePoints& points, int lane) {
     LaneInputs in;
     in.radial = make_vec3(0.0f);  // spheres are no lights
     in.point = s.kind == EmitterKind::WORLD ? s.direction : s.point;
@@ -66,6 +67,7 @@ LUCH_FN void setup_light_lane(const RenderView& scene, const PathState& path, u3
     in.transparent_depth = path.transparent_bounce;
     in.path = path_index;
     in.seed = 0;
+    in.time = time;
     if (s.kind == EmitterKind::TRIANGLE) {
         setup_surface_lane(scene.view, in, points, lane);
         return;
@@ -164,16 +166,16 @@ LUCH_FN void start_again(Ray* ray, Vec3 origin) {
     ray->origin = origin;
 }
 
-// Takes the ray straight through a surface, out of and into media.
-LUCH_FN void pass_surface(const SceneView& scene, MediumStack& stack, const Hit& hit, Ray* ray) {
-    SurfacePoint spot = surface_point(scene, hit, *ray);
-    Vec3 ng = border_normal(scene, hit, spot);
+// Takes the ray straight through a surface, as that is at a time, out of and into media.
+LUCH_FN void pass_surface(const SceneView& scene, MediumStack& stack, const Hit& hit, float time, Ray* ray) {
+    SurfacePoint spot = surface_point(scene, hit, *ray, time);
+    Vec3 ng = border_normal(scene, hit, spot, time);
     cross_border(scene, stack, hit.instance, hit.prim, dot(ng, ray->direction) > 0.0f);
     start_again(ray, offset_origin(spot, ng, ray->direction));
 }
 
 // A shadow ray that met only surfaces that may be transparent: from one to the next, until it is dark.
-// tracer.closest(ray) gives a Hit; shader.light(program, points, lane) a point's ClosureSet of light alone.
+// tracer.closest(ray) gives a Hit at tracer.time; shader.light(program, points, lane) a point's ClosureSet of light alone.
 // *steps: surfaces looked through; *rays: traced. stack: media around the ray's beginning, which become those at its end;
 // null: the scene has none.
 template <class Tracer, class Shader>
@@ -188,7 +190,7 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const 
             through *= media_transmittance(scene.media, *stack, min_f(hit.t, ray.t_max));
             if (is_zero(through)) return through;
             if (hit.instance != NONE && is_border(scene.view, hit)) {
-                pass_surface(scene.view, *stack, hit, &ray);
+                pass_surface(scene.view, *stack, hit, tracer.time, &ray);
                 passed--;  // no surface: it counts as none
                 if (!(ray.t_max > 0.0f)) return through;
                 continue;
@@ -199,7 +201,7 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const 
         const MaterialView& material = scene.view.materials[material_at(scene.view, hit.instance, hit.prim)];
         if (!(material.program.flags & PROGRAM_TRANSPARENT) || !material.transparent_shadows) return make_vec3(0.0f);
         ++*steps;
-        SurfacePoint spot = surface_point(scene.view, hit, ray);
+        SurfacePoint spot = surface_point(scene.view, hit, ray, tracer.time);
         points.count = 1;
         LaneInputs in;
         in.point = spot.p, in.radial = spot.radial;
@@ -212,6 +214,7 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const 
         in.depth = shadow.depth;
         in.transparent_depth = passed;
         in.path = 0, in.seed = 0;
+        in.time = tracer.time;
         setup_surface_lane(scene.view, in, points, 0);
         through *= shader.light(material.program, points).transparent;
         if (!(max_component(through) > 0.0f)) return make_vec3(0.0f);

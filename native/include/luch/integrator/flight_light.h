@@ -72,12 +72,13 @@ LUCH_FN float sample_equiangular(const Equiangular& e, float u) {
 // A light that the flight passes at a finite distance, as seen from some point of it: where the nearness of lights
 // will be looked for. False: there is none.
 LUCH_FN_SLOW bool choose_pivot(const RenderView& scene, const PathState& path, const Ray& ray,
-                               const FlightDensity& density, float reach, Vec3* pivot) {
+                               const FlightDensity& density, float reach, float time, Vec3* pivot) {
     if (scene.view.lights->emitter_count == 0u) return false;
     Vec2 v = sample_2d(path.sampler, path.dimension + FLIGHT_REFERENCE);
     Vec3 u = sample_3d(path.sampler, path.dimension + FLIGHT_PIVOT);
     float t = sample_flight_density(density, reach, v.y, v.x);
-    LightSample s = sample_light(scene.view, ray.origin + ray.direction * t, make_vec3(0.0f), true, u.z, {u.x, u.y});
+    LightSample s =
+        sample_light(scene.view, ray.origin + ray.direction * t, make_vec3(0.0f), true, u.z, {u.x, u.y}, time);
     *pivot = s.point;
     return s.kind != EmitterKind::NONE_ && finite_f(s.distance) && finite_v(s.point);
 }
@@ -85,9 +86,9 @@ LUCH_FN_SLOW bool choose_pivot(const RenderView& scene, const PathState& path, c
 // Where a flight is lit, and the inverse of that point's density: by the medium, by a light's nearness, or as likely
 // by either.
 LUCH_FN_SLOW float choose_lit_point(const RenderView& scene, const PathState& path, const Ray& ray,
-                                    const FlightDensity& density, float reach, float* inverse_density) {
+                                    const FlightDensity& density, float reach, float time, float* inverse_density) {
     Vec3 u = sample_3d(path.sampler, path.dimension + FLIGHT_LIT), pivot;
-    if (!choose_pivot(scene, path, ray, density, reach, &pivot)) {
+    if (!choose_pivot(scene, path, ray, density, reach, time, &pivot)) {
         float t = sample_flight_density(density, reach, u.z, u.x);
         *inverse_density = safe_divide(1.0f, flight_density(density, t));
         return t;
@@ -105,11 +106,11 @@ LUCH_FN_SLOW float choose_lit_point(const RenderView& scene, const PathState& pa
 // Emission of a light's program at the sampled place. shader.light as in walk_transparent.
 template <class Shader>
 LUCH_FN Color sampled_emission(const RenderView& scene, const PathState& path, u32 path_index, const LightSample& s,
-                               float footprint, Shader& shader, ShadePoints& points) {
-    ConstantEmission constant = emission_of(scene, s);
+                               float footprint, float time, Shader& shader, ShadePoints& points) {
+    ConstantEmission constant = emission_of(scene, s, time);
     if (!plan::SAMPLED_PROGRAMS || constant.constant) return constant.radiance;
     points.count = 1;
-    setup_light_lane(scene, path, path_index, s, footprint, points, 0);
+    setup_light_lane(scene, path, path_index, s, footprint, time, points, 0);
     return shader.light(program_of(scene, s), points).emission;
 }
 
@@ -118,24 +119,24 @@ LUCH_FN Ray ray_to_light(Vec3 p, const LightSample& s) {
     return {p, 0.0f, s.direction, reach};
 }
 
-// Next-event estimation at one point of a flight; false where nothing is to be brought.
+// Next-event estimation at one point of a flight; false where nothing is to be brought. time: of the path.
 template <class Shader>
 LUCH_FN bool light_flight(const RenderView& scene, const PathState& path, u32 path_index, const MediumStack& stack,
-                          const Ray& ray, const Flight& flight, Shader& shader, ShadePoints& points, Ray* to_light,
-                          ShadowRay* shadow) {
+                          const Ray& ray, const Flight& flight, float time, Shader& shader, ShadePoints& points,
+                          Ray* to_light, ShadowRay* shadow) {
     FlightDensity density;
     if (!scene.has_lights || !make_flight_density(flight, &density)) return false;
     float inverse_density;
-    float t = choose_lit_point(scene, path, ray, density, flight.length, &inverse_density);
+    float t = choose_lit_point(scene, path, ray, density, flight.length, time, &inverse_density);
     Color through = transmitted(flight.sum.extinction, t);
     t = keep_inside(t, flight.length, ray);
     Vec3 p = ray.origin + ray.direction * t, u = sample_3d(path.sampler, path.dimension + FLIGHT_LIGHT);
     if (is_zero(through) || !finite_v(p) || !(inverse_density > 0.0f)) return false;
-    LightSample s = sample_light(scene.view, p, make_vec3(0.0f), true, u.z, {u.x, u.y});
+    LightSample s = sample_light(scene.view, p, make_vec3(0.0f), true, u.z, {u.x, u.y}, time);
     if (s.kind == EmitterKind::NONE_ || !(s.pdf_sa > 0.0f) || !(s.visibility & RAY_VOLUME)) return false;
     if (light_is_spent(*scene.view.lights, s, path.bounce)) return false;
     float footprint = path.footprint + (path.travelled + t) * path.spread;
-    Color light = sampled_emission(scene, path, path_index, s, footprint, shader, points) * s.radiance;
+    Color light = sampled_emission(scene, path, path_index, s, footprint, time, shader, points) * s.radiance;
     if (is_zero(light)) return false;
     float phase_pdf;
     Color scattered = eval_media_phase(scene.media, stack, ray.direction, s.direction, &phase_pdf);

@@ -24,6 +24,7 @@ LUCH_FN Color eval_lamp(const RenderView& scene, const PathState& path, const La
     in.depth = depth_word(path);
     in.transparent_depth = path.transparent_bounce;
     in.path = 0, in.seed = 0;
+    in.time = SHUTTER_MIDDLE;  // lamps stand still
     setup_free_lane(in, hit.normal, points, 0);
     return shader.light(lamp.program, points).emission;
 }

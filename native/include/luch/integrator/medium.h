@@ -95,11 +95,11 @@ LUCH_FN Color transmitted_length(Color extinction, float distance) {
 }
 
 // The side of a surface that its medium is not on: unit, of a triangle or a sphere.
-LUCH_FN Vec3 border_normal(const SceneView& scene, const Hit& hit, const SurfacePoint& spot) {
-    const InstanceView& instance = scene.instances[hit.instance];
-    const MeshView& mesh = scene.meshes[instance.mesh];
-    if (is_sphere(mesh, hit.prim)) return spot.outward;
-    return world_face_normal(instance, triangle_at(scene, mesh, hit.prim));
+LUCH_FN Vec3 border_normal(const SceneView& scene, const Hit& hit, const SurfacePoint& spot, float time) {
+    InstanceView moved;
+    const InstanceView& instance = instance_at_time(scene, hit.instance, time, &moved);
+    if (is_sphere(scene.meshes[instance.mesh], hit.prim)) return spot.outward;
+    return world_face_normal(instance, triangle_at(scene, instance, hit.prim, time));
 }
 
 // Whether the surface is nothing but the border of a volume.

@@ -59,6 +59,7 @@ struct PathLimits {
 
 // Sobol dimensions: the camera takes the first, every event of a path a block of its own.
 inline constexpr u32 DIMENSIONS_CAMERA = 4;
+enum CameraDimension : u32 { DIM_PIXEL, DIM_LENS };  // and time, with the place in the pixel
 inline constexpr u32 DIMENSIONS_PER_EVENT = 4;
 enum EventDimension : u32 { DIM_LIGHT, DIM_BSDF, DIM_TERMINATE, DIM_AO };
 

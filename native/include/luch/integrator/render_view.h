@@ -2,6 +2,7 @@
 // cpu/integrator/renderer.cpp; nothing in it changes meanwhile.
 #pragma once
 #include "luch/camera/camera.h"
+#include "luch/camera/shutter.h"
 #include "luch/film/film.h"
 #include "luch/film/filter.h"
 #include "luch/integrator/medium.h"
@@ -41,7 +42,10 @@ struct RenderView {
     bool has_media;           // some volume or the world holds a medium: paths have lists of them
     MediaView media;
     float mist_start, mist_inverse_depth, mist_exponent;
+    const ShutterView* shutter;  // null: nothing moves, and no path has a time
 };
+
+LUCH_FN bool has_motion(const RenderView& scene) { return plan::MOTION && scene.shutter != nullptr; }
 
 // Paths take notes for a denoiser until they meet something rough.
 LUCH_FN bool wants_features(const FilmLayout& layout) {

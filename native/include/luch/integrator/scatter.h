@@ -26,7 +26,7 @@ LUCH_FN bool survives(const RenderView& scene, FilmWriter& writer, PathState& pa
 
 // What the material's program reads of a hit.
 LUCH_FN LaneInputs surface_inputs(const PathState& path, u32 path_index, const Hit& hit, const SurfacePoint& at,
-                                  Vec3 direction) {
+                                  Vec3 direction, float time) {
     LaneInputs in;
     in.point = at.p, in.radial = at.radial;
     in.to_viewer = -direction;
@@ -39,6 +39,7 @@ LUCH_FN LaneInputs surface_inputs(const PathState& path, u32 path_index, const H
     in.transparent_depth = path.transparent_bounce;
     in.path = path_index;
     in.seed = path.sampler.seed ^ path.sampler.index * 0x9e3779b9u;
+    in.time = time;
     return in;
 }
 
@@ -72,7 +73,8 @@ LUCH_FN void add_surface_emission(const RenderView& scene, FilmWriter& writer, c
     u32 instance = points.instance[lane];
     if (plan::EMISSIVE_MESHES && !(path.flags & PATH_NO_MIS)) {
         pdf = pdf_triangle(scene.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, instance,
-                           points.prim[lane], -lane_to_viewer(points, lane), points.ray_length[lane]);
+                           points.prim[lane], -lane_to_viewer(points, lane), points.ray_length[lane],
+                           lane_time(points, lane));
     }
     add_emission(scene, writer, path, emission * mis_weight(path.mis_pdf, pdf), writer.film.layout.emission,
                  scene.view.objects[scene.view.instances[instance].object].lightgroup);

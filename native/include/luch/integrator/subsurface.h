@@ -295,11 +295,11 @@ LUCH_FN void walk_inside(SubsurfaceWalk& walk, Tracer& tracer, u64* steps) {
 // What the material's program reads there, if its normals are bent; else only geometry is asked. As if the ray had
 // come from outside: normals face outwards.
 LUCH_FN LaneInputs exit_inputs(const PathState& path, u32 path_index, const SubsurfaceWalk& walk,
-                               const SurfacePoint& at) {
-    return surface_inputs(path, path_index, walk.hit, at, -walk.direction);
+                               const SurfacePoint& at, float time) {
+    return surface_inputs(path, path_index, walk.hit, at, -walk.direction, time);
 }
-LUCH_FN SurfacePoint exit_point(const RenderView& scene, const SubsurfaceWalk& walk) {
-    return surface_point(scene.view, walk.hit, {walk.position, 0.0f, walk.direction, INFINITE_DISTANCE});
+LUCH_FN SurfacePoint exit_point(const RenderView& scene, const SubsurfaceWalk& walk, float time) {
+    return surface_point(scene.view, walk.hit, {walk.position, 0.0f, walk.direction, INFINITE_DISTANCE}, time);
 }
 
 // The normal of the lobes under the surface, as the program at the exit made them.

@@ -62,10 +62,11 @@ LUCH_FN ProbeAxes choose_axes(Vec3 n, float* u) {
     return {b, t, n, 0.25f, 0.25f, 0.5f};
 }
 
-// The face's normal on the side that light went in on.
-LUCH_FN Vec3 probed_normal(const SceneView& scene, const SubsurfaceWalk& walk, u32 prim) {
-    const InstanceView& instance = scene.instances[walk.instance];
-    Vec3 n = world_face_normal(instance, triangle_at(scene, scene.meshes[instance.mesh], prim));
+// The face's normal on the side that light went in on, at that time.
+LUCH_FN Vec3 probed_normal(const SceneView& scene, const SubsurfaceWalk& walk, u32 prim, float time) {
+    InstanceView moved;
+    const InstanceView& instance = instance_at_time(scene, walk.instance, time, &moved);
+    Vec3 n = world_face_normal(instance, triangle_at(scene, instance, prim, time));
     return walk.back ? -n : n;
 }
 
@@ -98,7 +99,7 @@ LUCH_FN void probe_disk(const SceneView& scene, SubsurfaceWalk& walk, Tracer& tr
         Hit hit = tracer.closest(walk.instance, ray);
         ++*rays;
         if (hit.instance == NONE) break;
-        Vec3 normal = probed_normal(scene, walk, hit.prim);
+        Vec3 normal = probed_normal(scene, walk, hit.prim, tracer.time);
         float distance = length(ray.origin + ray.direction * hit.t - walk.entry);
         Color weight = probe_weight(walk, axes, normal, distance, pdf);
         float mean = average(weight);

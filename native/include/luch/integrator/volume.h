@@ -133,7 +133,7 @@ LUCH_FN MediumStack media_towards(const RenderView& scene, const MediumStack& st
 }
 
 // The media around a camera ray's beginning: those at the camera, and the borders on the way from it.
-// tracer.closest_of_all(ray) gives a Hit.
+// tracer.closest_of_all(ray) gives a Hit at tracer.time.
 template <class Tracer>
 LUCH_FN MediumStack media_at_lens(const RenderView& scene, Vec3 to, Tracer& tracer) {
     MediumStack stack = scene.media.camera;
@@ -145,7 +145,7 @@ LUCH_FN MediumStack media_at_lens(const RenderView& scene, Vec3 to, Tracer& trac
     for (u32 passed = 0; passed < MAX_CAMERA_BORDERS && ray.t_max > 0.0f; ++passed) {
         Hit hit = tracer.closest_of_all(ray);
         if (hit.instance == NONE) break;
-        pass_surface(scene.view, stack, hit, &ray);
+        pass_surface(scene.view, stack, hit, tracer.time, &ray);
     }
     return stack;
 }

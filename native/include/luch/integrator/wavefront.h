@@ -68,7 +68,14 @@ struct Wavefront {
     float* aovs;               // 4 floats for each of the film's AOVs, per entry of sorted; null: none
     u32* counters;             // WaveCounter
     u64* totals;               // WaveTotal
+    float* ray_time;  // of rays, next_rays, shadow_rays: 0 to 1 while the shutter is open. Null: nothing moves
+    float* next_time;
+    float* shadow_time;
 };
+
+LUCH_FN float time_of_ray(const Wavefront& wave, u32 k) {
+    return plan::MOTION && wave.ray_time ? wave.ray_time[k] : SHUTTER_MIDDLE;
+}
 
 struct RenderTask {
     RenderView scene;

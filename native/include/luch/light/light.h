@@ -34,12 +34,13 @@ struct LampHit {
 };
 
 // Implemented in light/sample.h (which includes the rest: lamp, triangle, tree, world, closest_lamp):
-//   LightSample sample_light(const SceneView&, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u);
+//   LightSample sample_light(const SceneView&, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u, float time);
 //     n: shading normal (zero vector inside a volume); transmits: light from behind n counts too.
 //     A caller whose closures have normals of their own (bump per closure) passes transmits = true or n = 0:
-//     emitters wholly behind n are never chosen.
+//     emitters wholly behind n are never chosen. Triangles that move are sampled where they are at that time; they are
+//     chosen by where they are at any.
 //   float pdf_triangle(const SceneView&, Vec3 p, Vec3 n, bool transmits, u32 instance, u32 prim,
-//                      Vec3 direction, float distance);   // what sample_light would have had; 0: not a light
+//                      Vec3 direction, float distance, float time);  // what sample_light would have had; 0: not a light
 //   float pdf_lamp(const SceneView&, Vec3 p, Vec3 n, bool transmits, const LampHit&, Vec3 direction);
 //   float pdf_world(const SceneView&, Vec3 p, Vec3 n, bool transmits, Vec3 direction);
 //   LampHit closest_lamp(const SceneView&, const Ray&, u32 ray_kind);  // lamps of finite size. Unit direction.

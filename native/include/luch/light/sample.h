@@ -149,7 +149,7 @@ LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index,
 }
 
 LUCH_FN_SLOW LightSample sample_chosen_triangle(const SceneView& scene, Emitter emitter, const LightQuery& q,
-                                                float probability, float u_cluster, Vec2 u) {
+                                                float probability, float u_cluster, Vec2 u, float time) {
     if (emitter.prim == NONE) {
         const InstanceView& instance = scene.instances[emitter.instance];
         const float* cdf = scene.lights->cluster_cdf + scene.lights->instances[emitter.instance].cdf;
@@ -157,7 +157,7 @@ LUCH_FN_SLOW LightSample sample_chosen_triangle(const SceneView& scene, Emitter 
         emitter.prim = find_interval(cdf, scene.meshes[instance.mesh].triangle_count, u_cluster, &within);
         probability *= cdf[emitter.prim + 1u] - cdf[emitter.prim];
     }
-    WorldTriangle triangle = make_world_triangle(scene, emitter.instance, emitter.prim, q.p);
+    WorldTriangle triangle = make_world_triangle(scene, emitter.instance, emitter.prim, q.p, time);
     const TriangleCone& cone = triangle.cone;
     LightSample s = no_light_sample();
     if (!triangle.sends) return s;
@@ -201,7 +201,8 @@ LUCH_FN_SLOW LightSample sample_chosen_world(const WorldLight& world, const Ligh
     return s;
 }
 
-LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u) {
+LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u,
+                                      float time = SHUTTER_MIDDLE) {
     const LightsView& lights = *scene.lights;
     LightQuery q = make_light_query(p, n, transmits);
     GroupShares shares;
@@ -215,7 +216,7 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
         float probability = choice.probability * shares.local;
         if (plan::LAMPS && emitter.lamp != NONE) return sample_chosen_lamp(lights, emitter.lamp, q, probability, u);
         if constexpr (!plan::EMISSIVE_MESHES) return no_light_sample();
-        return sample_chosen_triangle(scene, emitter, q, probability, cluster_unit(u_select, u), u);
+        return sample_chosen_triangle(scene, emitter, q, probability, cluster_unit(u_select, u), u, time);
     }
     u_select -= shares.local;
     // The last group takes what rounding leaves over.
@@ -231,7 +232,7 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
 // ---- densities for rays that found an emitter ----------------------------------------------------
 
 LUCH_FN_SLOW float pdf_triangle(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, u32 instance, u32 prim,
-                                Vec3 direction, float distance) {
+                                Vec3 direction, float distance, float time = SHUTTER_MIDDLE) {
     const LightsView& lights = *scene.lights;
     if (lights.emitter_count == 0u) return 0.0f;
     // Spheres are met, never chosen.
@@ -246,7 +247,7 @@ LUCH_FN_SLOW float pdf_triangle(const SceneView& scene, Vec3 p, Vec3 n, bool tra
         emitter = lights.triangle_emitters[static_cast<u64>(light.triangles) + prim];
     }
     if (emitter == NONE || !(share > 0.0f)) return 0.0f;
-    WorldTriangle triangle = make_world_triangle(scene, instance, prim, p);
+    WorldTriangle triangle = make_world_triangle(scene, instance, prim, p, time);
     if (!triangle.sends) return 0.0f;
     // From p itself: a ray that went straight through surfaces began its last piece elsewhere.
     float along = abs_f(dot(triangle.cone.unit_normal, direction));

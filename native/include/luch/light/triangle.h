@@ -10,10 +10,10 @@ struct WorldTriangle {
     bool sends;            // light towards the shaded point is sampled from this side
 };
 
-LUCH_FN_SLOW WorldTriangle make_world_triangle(const SceneView& scene, u32 instance, u32 prim, Vec3 p) {
-    const InstanceView& at = scene.instances[instance];
-    const MeshView& mesh = scene.meshes[at.mesh];
-    Triangle corners = triangle_at(scene, mesh, prim);
+LUCH_FN_SLOW WorldTriangle make_world_triangle(const SceneView& scene, u32 instance, u32 prim, Vec3 p, float time) {
+    InstanceView moved;
+    const InstanceView& at = instance_at_time(scene, instance, time, &moved);
+    Triangle corners = triangle_at(scene, at, prim, time);
     Affine to_world = at.to_world;
     WorldTriangle t;
     t.cone =

@@ -29,6 +29,7 @@ struct alignas(64) ShadePoints {
     u32 depth[SHADE_LANES];  // bounces so far: total | diffuse<<8 | glossy<<16 | transmission<<24
     u32 transparent_depth[SHADE_LANES];
     u32 path[SHADE_LANES];  // caller's path index
+    float time[SHADE_LANES];  // of the path, 0 to 1 while the shutter is open; set where anything moves
     u32 seed[SHADE_LANES];  // hash for stochastic nodes (none deterministic needs it)
     // For lamps and the world: the point is a direction; px..pz hold it, instance = NONE,
     // prim = light index for a lamp and NONE for the world.

@@ -1,7 +1,9 @@
 // The scene as kernels see it: plain pointers, filled once by cpu/scene_store (and its CUDA twin).
 #pragma once
+#include "luch/geometry/motion.h"
 #include "luch/geometry/ray.h"
 #include "luch/math/vec.h"
+#include "luch/plan.h"
 #include "luch/shade/op.h"
 
 namespace luch {
@@ -29,6 +31,8 @@ enum InstanceFlag : u32 {
     INSTANCE_SHADOW_CATCHER = 2u,
     INSTANCE_MIRRORED = 4u,
     INSTANCE_WORLD_NORMALS = 8u,  // its mesh's normals become unit in the world, not before
+    INSTANCE_MOVES = 16u,          // to_world and to_object are those of the shutter's middle: see instance_at_time
+    INSTANCE_DEFORMS = 32u,        // so are its mesh's positions and normals
 };
 
 struct InstanceView {
@@ -108,6 +112,7 @@ struct SceneView {
     const CameraView* camera;    // Texture Coordinate > Camera/Window, Camera Data; null: they give 0
     Vec2 frame_size;             // pixels of the full frame: Texture Coordinate > Window
     Vec3 origin;                 // Scene.origin: added to a position it gives Blender's world
+    const MotionView* motion;    // null: nothing moves
 };
 
 // Row `row` of an array of vectors.
@@ -136,6 +141,51 @@ struct Triangle {
 LUCH_FN Triangle triangle_at(const SceneView& scene, const MeshView& mesh, u32 prim) {
     const u32* v = corners_of(scene, mesh, prim);
     return {{vertex_at(scene, mesh, v[0]), vertex_at(scene, mesh, v[1]), vertex_at(scene, mesh, v[2])}};
+}
+
+// An instance as it stands at a time; *moved: room for one that moves.
+LUCH_FN_SLOW void move_instance(const SceneView& scene, u32 index, float time, InstanceView* moved) {
+    *moved = scene.instances[index];
+    moved->to_world = transform_at(scene.motion->keys, scene.motion->instances[index], time);
+    moved->to_object = inverse_of(moved->to_world);
+}
+LUCH_FN const InstanceView& instance_at_time(const SceneView& scene, u32 index, float time, InstanceView* moved) {
+    const InstanceView& still = scene.instances[index];
+    if (!plan::MOTION || !(still.flags & INSTANCE_MOVES)) return still;
+    move_instance(scene, index, time, moved);
+    return *moved;
+}
+
+LUCH_FN_SLOW Triangle deformed_triangle(const SceneView& scene, u32 mesh_index, u32 prim, float time) {
+    const MeshView& mesh = scene.meshes[mesh_index];
+    const MeshMotion& motion = scene.motion->meshes[mesh_index];
+    MotionPiece piece = motion_piece(motion.key_count, time);
+    const float* rows = scene.motion->positions + 3 * (u64(motion.first_position) + u64(piece.key) * mesh.vertex_count);
+    const u32* v = corners_of(scene, mesh, prim);
+    Triangle t;
+    for (int k = 0; k < 3; ++k)
+        t.p[k] = between(vec3_row(rows, v[k]), vec3_row(rows, u64(mesh.vertex_count) + v[k]), piece.share);
+    return t;
+}
+// Of an instance's mesh, in its object space, at a time.
+LUCH_FN Triangle triangle_at(const SceneView& scene, const InstanceView& instance, u32 prim, float time) {
+    if (plan::MOTION && (instance.flags & INSTANCE_DEFORMS)) return deformed_triangle(scene, instance.mesh, prim, time);
+    return triangle_at(scene, scene.meshes[instance.mesh], prim);
+}
+
+// The normals of a triangle's corners, object space; row: each one's within the mesh.
+LUCH_FN_SLOW Vec3 deformed_normal(const SceneView& scene, u32 mesh_index, u32 row, float time) {
+    const MeshView& mesh = scene.meshes[mesh_index];
+    const MeshMotion& motion = scene.motion->meshes[mesh_index];
+    MotionPiece piece = motion_piece(motion.key_count, time);
+    u64 rows = mesh.normals_domain == Domain::POINT ? mesh.vertex_count : 3 * u64(mesh.triangle_count);
+    u64 first = motion.first_normal + piece.key * rows + row;
+    Vec3 a = vec3_row(scene.motion->normals, first), b = vec3_row(scene.motion->normals, first + rows);
+    return normalize_or(between(a, b, piece.share), a);
+}
+LUCH_FN Vec3 normal_at_time(const SceneView& scene, const InstanceView& instance, u32 row, float time) {
+    if (plan::MOTION && (instance.flags & INSTANCE_DEFORMS)) return deformed_normal(scene, instance.mesh, row, time);
+    return vec3_row(scene.normals, u64(scene.meshes[instance.mesh].first_normal) + row);
 }
 
 // Material of a slot; a slot beyond the last one shows the last, as in Blender.

@@ -24,21 +24,21 @@ LUCH_FN void limit_to_tangent(Vec3 normal, Vec3 to_j, Vec3 to_k, float wj, float
     *below = min_f(*below, height - min_f(min_f(j, k), 0.0f));
 }
 
-// Of a triangle with normals. side: -1 where it is seen from behind. face_normal: taken where the normals' sum
+// Of a triangle t with normals. side: -1 where it is seen from behind. face_normal: taken where the normals' sum
 // vanishes. The curved surface lies under its tangent planes at the corners; as in Cycles, it is taken for the lowest.
 LUCH_FN SmoothSurface smooth_surface(const SceneView& scene, const MeshView& mesh, const InstanceView& instance,
-                                     u32 prim, float u, float v, float side, Vec3 face_normal) {
+                                     u32 prim, const Triangle& t, float u, float v, float time, float side,
+                                     Vec3 face_normal) {
     u32 i0 = prim * 3, i1 = i0 + 1, i2 = i0 + 2;
     if (mesh.normals_domain == Domain::POINT) {
         const u32* corner = corners_of(scene, mesh, prim);
         i0 = corner[0], i1 = corner[1], i2 = corner[2];
     }
-    Vec3 n0 = vec3_row(scene.normals, mesh.first_normal + i0) * side;
-    Vec3 n1 = vec3_row(scene.normals, mesh.first_normal + i1) * side;
-    Vec3 n2 = vec3_row(scene.normals, mesh.first_normal + i2) * side;
+    Vec3 n0 = normal_at_time(scene, instance, i0, time) * side;
+    Vec3 n1 = normal_at_time(scene, instance, i1, time) * side;
+    Vec3 n2 = normal_at_time(scene, instance, i2, time) * side;
     float w = 1.0f - u - v;
     Vec3 sum = n0 * w + n1 * u + n2 * v, n = transform_direction_transposed(instance.to_object, sum);
-    Triangle t = triangle_at(scene, mesh, prim);
     Vec3 e01 = t.p[1] - t.p[0], e12 = t.p[2] - t.p[1], e20 = t.p[0] - t.p[2];
     float above = INFINITE_DISTANCE, below = INFINITE_DISTANCE;
     limit_to_tangent(n0, e01, -e20, u, v, &above, &below);
@@ -56,20 +56,24 @@ struct LaneInputs {
     float u, v;
     float ray_length, footprint;
     u32 flags, depth, transparent_depth, path, seed;
+    float time;
 };
 
 // Fills lane `lane` for a point on a triangle or sphere. Normals are turned to the viewer's side and
 // PATH_BACKFACING is set when that turned them.
 LUCH_FN void setup_surface_lane(const SceneView& scene, const LaneInputs& in, ShadePoints& points, int lane) {
-    const InstanceView& instance = scene.instances[in.instance];
+    InstanceView moved;
+    const InstanceView& instance = instance_at_time(scene, in.instance, in.time, &moved);
     const MeshView& mesh = scene.meshes[instance.mesh];
     bool round = is_sphere(mesh, in.prim);
-    Vec3 ng = round ? in.radial : world_face_normal(instance, triangle_at(scene, mesh, in.prim));
+    Triangle t{};
+    if (!round) t = triangle_at(scene, instance, in.prim, in.time);
+    Vec3 ng = round ? in.radial : world_face_normal(instance, t);
     bool back = dot(ng, in.to_viewer) < 0.0f;
     if (back) ng = -ng;
     SmoothSurface smooth = {ng, 0.0f, 0.0f};
     if (!round && mesh.normals_domain != Domain::NONE_)
-        smooth = smooth_surface(scene, mesh, instance, in.prim, in.u, in.v, back ? -1.0f : 1.0f, ng);
+        smooth = smooth_surface(scene, mesh, instance, in.prim, t, in.u, in.v, in.time, back ? -1.0f : 1.0f, ng);
     Vec3 n = smooth.normal;
     points.above[lane] = smooth.above, points.below[lane] = smooth.below;
     points.terminator[lane] = scene.objects[instance.object].shadow_terminator;
@@ -87,6 +91,7 @@ LUCH_FN void setup_surface_lane(const SceneView& scene, const LaneInputs& in, Sh
     points.transparent_depth[lane] = in.transparent_depth;
     points.path[lane] = in.path;
     points.seed[lane] = in.seed;
+    if (plan::MOTION) points.time[lane] = in.time;
 }
 
 // The same for the world (instance NONE, prim NONE: the point is the unit direction looked along) and
@@ -110,6 +115,8 @@ LUCH_FN void setup_free_lane(const LaneInputs& in, Vec3 normal, ShadePoints& poi
     points.seed[lane] = in.seed;
 }
 
+// Read by nobody but what moves.
+LUCH_FN float lane_time(const ShadePoints& p, int i) { return plan::MOTION ? p.time[i] : SHUTTER_MIDDLE; }
 LUCH_FN Vec3 lane_position(const ShadePoints& p, int i) { return {p.px[i], p.py[i], p.pz[i]}; }
 LUCH_FN Vec3 lane_normal(const ShadePoints& p, int i) { return {p.nx[i], p.ny[i], p.nz[i]}; }
 LUCH_FN Vec3 lane_face_normal(const ShadePoints& p, int i) { return {p.gx[i], p.gy[i], p.gz[i]}; }

@@ -45,14 +45,18 @@ LUCH_FN Vec2 barycentric_step(Vec3 edge_u, Vec3 edge_v, Vec3 step, Vec3 n) {
     return {(s.x * v.y - s.y * v.x) * inverse, (s.y * u.x - s.x * u.y) * inverse};
 }
 
+// Of the path that came to the point; read where something moves.
+LUCH_FN float time_at(const OpContext& c) { return plan::MOTION ? c.points->time[c.lane] : SHUTTER_MIDDLE; }
+
 // Barycentrics u, v at the corner of the stencil that params[0..1] name.
 LUCH_FN Vec2 barycentrics_at(const OpContext& c, const u32* params) {
     Vec2 uv = {c.points->u[c.lane], c.points->v[c.lane]};
     if (params[0] == 0) return uv;
-    const InstanceView& instance = c.scene->instances[c.points->instance[c.lane]];
+    InstanceView moved;
+    const InstanceView& instance = instance_at_time(*c.scene, c.points->instance[c.lane], time_at(c), &moved);
     const MeshView& mesh = c.scene->meshes[instance.mesh];
     if (is_sphere(mesh, c.points->prim[c.lane])) return uv;
-    Triangle t = triangle_at(*c.scene, mesh, c.points->prim[c.lane]);
+    Triangle t = triangle_at(*c.scene, instance, c.points->prim[c.lane], time_at(c));
     Vec3 edge_u = transform_direction(instance.to_world, t.p[1] - t.p[0]);
     Vec3 edge_v = transform_direction(instance.to_world, t.p[2] - t.p[0]);
     // Seen from behind, Cycles turns both edges round: attributes step the other way than places do.

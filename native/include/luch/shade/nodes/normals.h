@@ -46,7 +46,8 @@ struct OpLayerWeightFacing {  // in: blend, normal
 // The part of an object-space direction that lies in the surface, unit, world space.
 LUCH_FN Vec3 surface_tangent(const OpContext& c, Vec3 direction_object) {
     Vec3 n = normal_at(c);
-    Vec3 t = normal_to_world(instance_at(c), direction_object);
+    InstanceView moved;
+    Vec3 t = normal_to_world(placed_at(c, &moved), direction_object);
     return cross(n, normalize(cross(t, n)));
 }
 // params: stencil (unused corner 0), axis 0..2; 3: the surface's own tangent, around Z on a mesh. A sphere of a point cloud
@@ -80,7 +81,8 @@ struct OpBump {
     static constexpr int inputs = 9, outputs = 3, params = 2;
     static constexpr bool reads_point = true;
     LUCH_FN static void eval(const OpContext& c, const u32* params, const float* in, float* out) {
-        const InstanceView* instance = instance_at(c);
+        InstanceView moved;
+        const InstanceView* instance = placed_at(c, &moved);
         Stencil s = stencil_at(c);
         Vec3 n = load_vec3(in + 6);
         const bool object_space = params[1] != 0 && instance;
@@ -112,8 +114,8 @@ LUCH_FN Vec3 mesh_normal(const OpContext& c, const InstanceView& instance) {
     float u = c.points->u[c.lane], v = c.points->v[c.lane], weight[3] = {1.0f - u - v, u, v};
     Vec3 n = make_vec3(0.0f);
     for (u32 k = 0; k < 3; k++) {
-        u32 row = mesh.first_normal + (mesh.normals_domain == Domain::CORNER ? 3 * prim + k : vertex[k]);
-        n += load_vec3(scene.normals + 3 * u64(row)) * weight[k];
+        u32 row = mesh.normals_domain == Domain::CORNER ? 3 * prim + k : vertex[k];
+        n += normal_at_time(scene, instance, row, time_at(c)) * weight[k];
     }
     return normalize_or(n, flat);
 }
@@ -127,7 +129,8 @@ struct OpNormalMap {
         Vec3 map = (load_vec3(in + 1) - make_vec3(0.5f)) * 2.0f, shading = normal_at(c), n;
         if (params[1] != 0) map.y = -map.y;
         const float strength = in[0];
-        const InstanceView* instance = instance_at(c);
+        InstanceView moved;
+        const InstanceView* instance = placed_at(c, &moved);
         if (params[0] == 0) {
             const u32 center[2] = {0u, 0u};
             AttributeValue a = read_attribute(c, attribute_of(c, params[2]), center);

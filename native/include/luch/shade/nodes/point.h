@@ -23,6 +23,12 @@ LUCH_FN const InstanceView* instance_at(const OpContext& c) {
     return index == NONE ? nullptr : c.scene->instances + index;
 }
 
+// The same as it stands at the path's time; *moved: room for one that moves.
+LUCH_FN const InstanceView* placed_at(const OpContext& c, InstanceView* moved) {
+    const u32 index = c.points->instance[c.lane];
+    return index == NONE ? nullptr : &instance_at_time(*c.scene, index, time_at(c), moved);
+}
+
 LUCH_FN const LampView* lamp_at(const OpContext& c) {
     const u32 index = c.points->prim[c.lane];
     return c.points->instance[c.lane] == NONE && index != NONE ? c.scene->lights->lamps + index : nullptr;
@@ -73,7 +79,8 @@ LUCH_POINT_OP(OpPointParametric, 3, 2, {
 // Object space; params[2..13]: another object's world-to-object matrix in Blender's world, where
 // the instruction has it.
 LUCH_FN Vec3 object_position(const OpContext& c, const u32* params) {
-    const InstanceView* instance = instance_at(c);
+    InstanceView moved;
+    const InstanceView* instance = placed_at(c, &moved);
     Vec3 p = position_at(c) + stencil_offset(c, params);
     if (instance) return transform_point(instance->to_object, p);
     const LampView* lamp = lamp_at(c);
@@ -93,9 +100,10 @@ LUCH_FN Vec3 normal_to_world(const InstanceView* instance, Vec3 n) {
     return instance ? safe_normalize(transform_direction_transposed(instance->to_object, n)) : n;
 }
 LUCH_POINT_OP(OpPointObjectNormal, 3, 0, {
+    InstanceView moved;
     const LampView* lamp = lamp_at(c);
-    store_vec3(out,
-               lamp ? safe_normalize(to_lamp(*lamp, normal_at(c))) : normal_to_object(instance_at(c), normal_at(c)));
+    store_vec3(out, lamp ? safe_normalize(to_lamp(*lamp, normal_at(c)))
+                         : normal_to_object(placed_at(c, &moved), normal_at(c)));
 });
 
 // 0..1 over Blender's texture space; an attribute of undeformed coordinates wins.
@@ -152,7 +160,8 @@ LUCH_POINT_OP(OpCameraData, 5, 0, {
 });
 
 LUCH_POINT_OP(OpObjectLocation, 3, 0, {
-    const InstanceView* i = instance_at(c);
+    InstanceView moved;
+    const InstanceView* i = placed_at(c, &moved);
     const LampView* lamp = lamp_at(c);
     Vec3 place = lamp ? lamp->position + c.scene->origin : make_vec3(0.0f);
     if (i) place = make_vec3(i->to_world.m[3], i->to_world.m[7], i->to_world.m[11]) + c.scene->origin;
@@ -175,7 +184,8 @@ LUCH_POINT_OP(OpObjectRandom, 1, 0, {
 // Point Info; out: centre in Blender's world, radius there, random number. Zero where the point is on no sphere.
 LUCH_POINT_OP(OpPointInfo, 5, 0, {
     for (int k = 0; k < 5; k++) out[k] = 0.0f;
-    const InstanceView* i = instance_at(c);
+    InstanceView moved;
+    const InstanceView* i = placed_at(c, &moved);
     const u32 prim = c.points->prim[c.lane];
     if (!i || !is_sphere(c.scene->meshes[i->mesh], prim)) return;
     const MeshView& mesh = c.scene->meshes[i->mesh];
@@ -221,11 +231,12 @@ struct OpWireframe {
     static constexpr bool reads_point = true;
     LUCH_FN_SLOW static void eval(const OpContext& c, const u32* params, const float* in, float* out) {
         out[0] = 0.0f;
-        const InstanceView* instance = instance_at(c);
+        InstanceView moved;
+        const InstanceView* instance = placed_at(c, &moved);
         if (!instance) return;
         const MeshView& mesh = c.scene->meshes[instance->mesh];
         if (is_sphere(mesh, c.points->prim[c.lane])) return;
-        Triangle t = triangle_at(*c.scene, mesh, c.points->prim[c.lane]);
+        Triangle t = triangle_at(*c.scene, *instance, c.points->prim[c.lane], time_at(c));
         float width = 1.0f;
         if (params[2] != 0) {  // seen across the ray
             Stencil s = stencil_at(c);
@@ -256,7 +267,8 @@ struct OpVectorTransform {
     LUCH_FN_SLOW static void eval(const OpContext& c, const u32* params, const float* in, float* out) {
         Vec3 v = load_vec3(in);
         const u32 from = params[0], to = params[1], kind = params[2];
-        const InstanceView* instance = instance_at(c);
+        InstanceView moved;
+        const InstanceView* instance = placed_at(c, &moved);
         const Vec3 origin = kind == 1 ? c.scene->origin : make_vec3(0.0f);
         if (from == to) return store_vec3(out, v);
         // To camera-relative world space, then to where it is wanted.

@@ -1,0 +1,53 @@
+#include "cpu/motion/motion_store.h"
+
+#include <algorithm>
+
+namespace luch::cpu {
+
+void MotionStore::add_mesh(u32 mesh, u32 vertex_count, u32 normal_rows, u32 key_count, const float* positions,
+                           const float* normals) {
+    if (meshes_.size() <= mesh) meshes_.resize(mesh + 1);
+    meshes_[mesh] = {u32(positions_.size() / 3), u32(normals_.size() / 3), key_count};
+    positions_.insert(positions_.end(), positions, positions + size_t(key_count) * vertex_count * 3);
+    if (normals) normals_.insert(normals_.end(), normals, normals + size_t(key_count) * normal_rows * 3);
+}
+
+bool MotionStore::add_instance(u32 instance, const std::vector<Matrix>& matrices) {
+    bool moves = std::any_of(matrices.begin(), matrices.end(), [&](const Matrix& m) { return m != matrices.front(); });
+    std::vector<TransformKey> keys;
+    if (moves) keys = make_keys(matrices);
+    if (keys.size() < 2) return false;
+    if (instances_.size() <= instance) instances_.resize(instance + 1);
+    instances_[instance] = {u32(keys_.size()), u32(keys.size())};
+    keys_.insert(keys_.end(), keys.begin(), keys.end());
+    return true;
+}
+
+const MotionView* MotionStore::finish(size_t mesh_count, std::vector<InstanceView>& instances) {
+    if (instances_.empty() && meshes_.empty()) return nullptr;
+    instances_.resize(instances.size());
+    meshes_.resize(mesh_count);
+    for (size_t i = 0; i < instances.size(); ++i) {
+        if (instances_[i].key_count) instances[i].flags |= INSTANCE_MOVES;
+        if (meshes_[instances[i].mesh].key_count) instances[i].flags |= INSTANCE_DEFORMS;
+    }
+    view_ = {instances_.data(), keys_.data(), meshes_.data(), positions_.data(), normals_.data()};
+    return &view_;
+}
+
+void MotionStore::describe(DeviceImage& image, u32 block, const SceneView& view) const {
+    if (!view.motion) return;
+    u32 motion = image.add_array("motion", block, view.motion, 1);
+    image.add_array("moving instances", motion, view_.instances, instances_.size());
+    image.add_array("motion keys", motion, view_.keys, keys_.size());
+    image.add_array("moving meshes", motion, view_.meshes, meshes_.size());
+    image.add_array("moving positions", motion, view_.positions, positions_.size());
+    image.add_array("moving normals", motion, view_.normals, normals_.size());
+}
+
+size_t MotionStore::bytes() const {
+    return instances_.size() * sizeof(InstanceMotion) + keys_.size() * sizeof(TransformKey) +
+           meshes_.size() * sizeof(MeshMotion) + (positions_.size() + normals_.size()) * sizeof(float);
+}
+
+}  // namespace luch::cpu
