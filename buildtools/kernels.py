@@ -42,6 +42,11 @@ def units() -> List[Unit]:
     ]
 
 
+def _lean(module: str) -> List[str]:
+    """General stages lack the code of rare effects: three times as long to compile, for scenes that are few."""
+    return [f"-DLUCH_PLAN_{name}=0" for name in table()["rare"]] if module == "RENDER_STAGES" else []
+
+
 def _traced() -> Dict[str, str]:
     """What walks structures: bare, and in a render."""
     return {**table()["modules"], **table()["tracers"]}
@@ -61,7 +66,7 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
 
     def to_ptx(unit: Unit) -> str:
         module, precision = unit
-        flags = table()["flags"]["all"] + table()["flags"][precision]
+        flags = table()["flags"]["all"] + table()["flags"][precision] + _lean(module)
         folders = ["-I", str(NATIVE / "include"), "-I", str(NATIVE / "cuda")]
         source = NATIVE / "cuda" / {**_traced(), **table()["builders"], **table()["stages"]}[module]
         return _errors(

@@ -63,6 +63,12 @@ def source_of(module: str) -> Path:
     return source_folders()[1] / name
 
 
+def rare_effects() -> list[str]:
+    """Names of LUCH_PLAN_... that the stages compiled ahead of time lack: scenes with them wait for their own."""
+    names: list[str] = table()["rare"]
+    return names
+
+
 def flags(precision: str) -> list[str]:
     """What decides the numbers: of the table, the same for NVRTC and nvcc."""
     return [*table()["flags"]["all"], *table()["flags"][precision]]
@@ -70,7 +76,7 @@ def flags(precision: str) -> list[str]:
 
 def ahead_name(module: str, precision: str, architecture: int) -> str:
     """File name under which a kernel compiled ahead of time is looked for. architecture 0: PTX, for all of them."""
-    parts = [_sources_hash(), source_of(module).name, *flags(precision), str(architecture)]
+    parts = [_sources_hash(), source_of(module).name, *flags(precision), *rare_effects(), str(architecture)]
     key = hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:16]
     return (
         f"{module}-{precision}-{key}.ptx"

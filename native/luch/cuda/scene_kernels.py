@@ -54,6 +54,7 @@ class SceneKernels:
             self._module = self._loaded(kept)
             return
         usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
+        usable = usable and not any(self.plan[name] for name in compiler.rare_effects())
         general = compiler.ahead(STAGES, self._precision, architecture) if usable else None
         if general is None:
             self._compile(architecture)
