@@ -238,8 +238,9 @@ def test_an_architecture_that_the_build_did_not_know_takes_ptx(monkeypatch: pyte
     (tmp_path / compiler.ahead_name("CWBVH", "WATERTIGHT", 0)).write_bytes(b"ptx")
     assert compiler.ahead("CWBVH", "WATERTIGHT", 130) == b"ptx"
     assert compiler.ahead("CWBVH", "DOUBLE", 130) is None
-    (tmp_path / compiler.ahead_name("CWBVH", "WATERTIGHT", 90)).write_bytes(b"cubin")
-    assert compiler.ahead("CWBVH", "WATERTIGHT", 90) == b"cubin"
+    (tmp_path / compiler.ahead_name("CWBVH", "WATERTIGHT", 80)).write_bytes(b"cubin")
+    assert [compiler.ahead("CWBVH", "WATERTIGHT", a) for a in (80, 86, 89)] == [b"cubin"] * 3
+    assert [compiler.ahead("CWBVH", "WATERTIGHT", a) for a in (75, 90)] == [b"ptx"] * 2
 
 
 @pytest.mark.parametrize("precision", ["WATERTIGHT", "FAST"], ids="fibers-{}".format)

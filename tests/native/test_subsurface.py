@@ -13,6 +13,7 @@ from luch.scene import Camera, Film, Instances, Light, Material, Mesh, Object, S
 from luch.shader import ProgramBuilder
 from support.accel_meshes import icosphere
 from support.cuda_on_cpu import FIBERS
+from support.devices import watch_shadows
 from support.effects import ONE, PLAIN, closure, program
 
 WALK, SKIN, LEGACY, BURLEY = range(4)  # SubsurfaceMethod of bsdf/params.h
@@ -189,6 +190,15 @@ def everything_inside() -> Scene:
     scene.camera = replace(scene.camera, ortho_scale=3.0)
     scene.film.passes = ["Combined", "Diffuse Direct", "Diffuse Indirect", "Glossy Direct", "Ambient Occlusion"]
     return scene
+
+
+def test_a_path_adds_light_of_its_surface_and_of_its_exit_one_after_the_other(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watched, scene = watch_shadows(monkeypatch), everything_inside()
+    stats = render(replace(scene, settings=replace(scene.settings, device="CUDA"))).stats
+    assert stats["subsurface_walks"] > 0
+    assert sum(watched) > 50
 
 
 def test_cuda_walks_as_the_cpu_does(place: str) -> None:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from luch.render import render
 from luch.scene import Camera, Material, Medium, Phase, Scene
-from support.devices import both, check_equal
+from support.devices import both, check_equal, watch_shadows
 from support.effects import program
 from support.everything import everything, glass
 from support.media import at, box, even, fog
@@ -61,3 +62,12 @@ def test_a_scene_without_volumes_has_no_code_for_them(place: str) -> None:
     _, _, _, stats = both(everything())
     assert not stats["kernel_plan"]["VOLUMES"]
     assert stats["flights"] == 0
+
+
+def test_a_path_adds_light_of_its_flight_and_of_its_surface_one_after_the_other(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watched = watch_shadows(monkeypatch)
+    stats = render(replace(misty(), settings=replace(misty().settings, device="CUDA"))).stats
+    assert stats["flights"] > 0
+    assert sum(watched) > 100

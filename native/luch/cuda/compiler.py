@@ -102,13 +102,21 @@ def _loaded(module: str, precision: str, defines: tuple[str, ...], device: int) 
     return Module(ahead(module, precision, architecture) or compiled(module, precision, architecture))
 
 
+def _runs_on(architecture: int) -> list[int]:
+    """Of the architectures of kernels.json those whose machine code runs there, the best first: code for 8.0 does on
+    8.6 and 8.9, as all of one major version is upwards compatible.
+    """
+    known: list[int] = table()["architectures"]
+    return sorted((a for a in known if a // 10 == architecture // 10 and a <= architecture), reverse=True)
+
+
 def ahead(module: str, precision: str, architecture: int) -> bytes | None:
     """What build.py compiled ahead of time: machine code, or PTX where the build did not know the architecture.
 
     The stages have no PTX: the driver would need minutes for all that general code may do, NVRTC needs seconds for
     what a scene does.
     """
-    for target in (architecture, 0):
+    for target in (*_runs_on(architecture), 0):
         ready = AHEAD / ahead_name(module, precision, target)
         if ready.is_file():
             return ready.read_bytes()

@@ -126,6 +126,11 @@ class Memory:
         """Address of one of WaveCounter."""
         return int(self.counters.data.ptr) + 4 * COUNTERS.index(name)
 
+    def clear(self, *names: str) -> None:
+        """Sets some of WaveCounter to 0, on the device."""
+        for index in map(COUNTERS.index, names):
+            self.counters[index : index + 1].fill(0)
+
     def count(self, name: str) -> int:
         """Of one of WaveCounter; waits for the device."""
         index = COUNTERS.index(name)
@@ -360,25 +365,39 @@ class DeviceRenderer:
         kinds = memory.address("next_kind" if turn else "ray_kind")
         self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"), memory.counter("traced"),
                              memory.address("next_time" if turn else "ray_time"))  # fmt: skip
+        shadows = 0
         if self._media:
             self._launch(stages.kernel("cross_media"), turn, rays)
+            shadows += self._cast_shadows(turn)
         self._launch(stages.kernel("find_light"), turn, rays)
         self._launch(paths.kernel("count_materials"), turn, rays)
         self._launch(paths.kernel("place_materials"), turn, 1)
         self._launch(paths.kernel("sort_hits"), turn, rays)
         self._launch(stages.kernel("shade_surfaces"), turn, rays)
         if self._walks is not None and (walks := memory.count("walks")):
+            shadows += self._cast_shadows(turn)
             kernel = self._walks.kernel("walk_subsurface")
             kernel.launch(min(kernel.resident_blocks(BLOCK), -(-walks // BLOCK)), BLOCK, [memory.tasks[turn]])
             self._launch(self._walks.kernel("probe_profiles"), turn, walks)
             self._launch(stages.kernel("shade_exits"), turn, walks)
+        shadows += self._cast_shadows(turn)
+        self._launch(paths.kernel("next_round"), turn, 1)
+        return shadows
+
+    def _cast_shadows(self, turn: int) -> int:
+        """Traces the shadow rays so far and adds their light; returns how many there were.
+
+        A path may have one of them waiting that adds to Combined, no more: its film's sums are no atomic ones. So what
+        its flight through a medium cast is added before its surface is lit, and that before its exit from below one.
+        """
+        memory = self._memory
         shadows = memory.count("shadows")
         if shadows:
             self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"), memory.address("blocked"),
                              memory.counter("shadows"), memory.counter("shadowed"),
                              memory.address("shadow_time"))  # fmt: skip
-            self._launch(stages.kernel("add_shadows"), turn, shadows, self._tracer.root)
-        self._launch(paths.kernel("next_round"), turn, 1)
+            self._launch(self._stages.kernel("add_shadows"), turn, shadows, self._tracer.root)
+            memory.clear("shadows", "shadowed")
         return shadows
 
     def _launch(self, kernel: Any, turn: int, threads: int, *more: bytes) -> None:
