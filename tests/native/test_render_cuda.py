@@ -133,11 +133,11 @@ def test_a_gpu_without_memory_is_left_out_and_named(
 ) -> None:
     allocate, calls = device_render.DeviceRenderer._allocate, []
 
-    def full(self: device_render.DeviceRenderer, pixels: int, materials: int) -> Any:
-        calls.append(pixels)
+    def full(self: device_render.DeviceRenderer, *wanted: Any) -> Any:
+        calls.append(wanted)
         if len(calls) == 2:
             raise device.DeviceError("The GPU has 0 GiB free.")
-        return allocate(self, pixels, materials)
+        return allocate(self, *wanted)
 
     monkeypatch.setattr(device_render.DeviceRenderer, "_allocate", full)
     scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
