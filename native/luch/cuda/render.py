@@ -22,7 +22,7 @@ from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
 from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, too_large
 
-BLOCK = 128  # STAGE_BLOCK of render/stage.cuh
+BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
 # Paths under way at once. Fewer leave a large GPU idle in late bounces, more only cost memory.
 MOST_PATHS = 1 << 21
 FEWEST_PATHS = 1 << 14
@@ -207,7 +207,36 @@ class HostScene:
         own_counts[...] = counts
 
 
-class DeviceRenderer:
+class HostFilm:
+    """What is read from the film on the host: of any renderer whose film lies on devices."""
+
+    def __init__(self, host: HostScene) -> None:
+        self._host = host
+
+    def _download(self) -> None:
+        """Brings the film's sums to the host, if they are not there."""
+        raise NotImplementedError
+
+    def passes(self) -> dict[str, Any]:
+        """Blender's pass name -> float32 (H, W, C), bottom row first."""
+        self._download()
+        passes: dict[str, Any] = self._host.core.passes()
+        return passes
+
+    def film_arrays(self) -> tuple[Any, Any]:
+        """As core.render.Renderer's."""
+        self._download()
+        rows, counts = self._host.core.film_arrays()
+        return rows, counts
+
+    def deviations(self) -> tuple[Any, Any, float]:
+        """As core.render.Renderer's."""
+        self._download()
+        mean, deviation, share = self._host.core.deviations()
+        return mean, deviation, share
+
+
+class DeviceRenderer(HostFilm):
     """One scene on the current CUDA device. Raises DeviceError where there is none, or its memory is too small."""
 
     def __init__(self, scene: Any, host: HostScene | None = None) -> None:
@@ -216,7 +245,7 @@ class DeviceRenderer:
         host: several devices share one.
         """
         self._device = cupy().cuda.Device()
-        self._host = host or HostScene(scene)
+        super().__init__(host or HostScene(scene))
         self._scene = scene
         self._lock = threading.Lock()
         self._cancelled = False
@@ -423,27 +452,8 @@ class DeviceRenderer:
             return memory.rows[0].get(), memory.counts[0].get()
 
     def _download(self) -> None:
-        """Brings the film's sums to the host, where passes are read from them."""
         if not self._merged:
             self._host.set_film(*self.film())
-
-    def passes(self) -> dict[str, Any]:
-        """Blender's pass name -> float32 (H, W, C), bottom row first."""
-        self._download()
-        passes: dict[str, Any] = self._host.core.passes()
-        return passes
-
-    def film_arrays(self) -> tuple[Any, Any]:
-        """As core.render.Renderer's."""
-        self._download()
-        rows, counts = self._host.core.film_arrays()
-        return rows, counts
-
-    def deviations(self) -> tuple[Any, Any, float]:
-        """As core.render.Renderer's."""
-        self._download()
-        mean, deviation, share = self._host.core.deviations()
-        return mean, deviation, share
 
     def stats(self) -> dict[str, Any]:
         """Counts, bytes and seconds, under the names of the CPU's."""

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy
-from luch.cuda.render import DeviceRenderer, HostScene, parted
+from luch.cuda.render import DeviceRenderer, HostFilm, HostScene, parted
 from luch.cuda.trace import TreesTooDeep
 
 # Counts and seconds that are added up; of other statistics the first device's stand for all.
@@ -52,13 +52,12 @@ def shares(count: int, weights: list[float]) -> list[int]:
     return [after - before for before, after in itertools.pairwise(ends)]
 
 
-class SeveralDevices:
+class SeveralDevices(HostFilm):
     """The methods of ``core.render.Renderer`` that ``luch.render`` uses, on several CUDA devices."""
 
     def __init__(self, scene: Any, indices: list[int]) -> None:
         """scene: luch.scene.Scene; indices: CUDA's, of at least one device. Raises ValueError as DeviceRenderer."""
-        self._scene = scene
-        self._host = HostScene(scene)
+        super().__init__(HostScene(scene))
         self._devices: list[DeviceRenderer] = []
         for index in indices:
             with cupy().cuda.Device(index):
@@ -166,24 +165,6 @@ class SeveralDevices:
             rows += more_rows
             counts += more_counts
         self._host.set_film(rows, counts)
-
-    def passes(self) -> dict[str, Any]:
-        """Blender's pass name -> float32 (H, W, C), bottom row first."""
-        self._download()
-        passes: dict[str, Any] = self._host.core.passes()
-        return passes
-
-    def film_arrays(self) -> tuple[Any, Any]:
-        """As core.render.Renderer's."""
-        self._download()
-        rows, counts = self._host.core.film_arrays()
-        return rows, counts
-
-    def deviations(self) -> tuple[Any, Any, float]:
-        """As core.render.Renderer's."""
-        self._download()
-        mean, deviation, share = self._host.core.deviations()
-        return mean, deviation, share
 
     def stats(self) -> dict[str, Any]:
         """Counts, bytes and seconds, of all devices together."""
