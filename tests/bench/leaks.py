@@ -2,8 +2,9 @@
 
   build.py bench leaks [--rays 1e8] [--kinds BVH,KD_TREE] [--device cuda]
 
-Every structure, mesh and kind of ray gets the number of rays asked for, shared among the kinds of rays. Writes what
-was run, and what got out, to tests/bench/records/leaks-DEVICE.json, kept in the repository.
+Every structure and mesh gets the number of rays asked for, shared among the kinds of rays. Writes what was run, and
+what got out, to tests/bench/records/leaks-DEVICE.json, kept in the repository: a row as soon as it is known, in place of
+the one of the same structure and mesh.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,19 +26,28 @@ from luch.accel import KINDS, Accel  # noqa: E402
 from support import closed_meshes  # noqa: E402
 
 
-def run(kind: str, device: str, count: int) -> list[dict[str, Any]]:
+def run(kind: str, device: str, count: int) -> Iterator[dict[str, Any]]:
     """One structure: a row a mesh."""
-    rows = []
     for name in closed_meshes.MESHES:
         start = time.perf_counter()
         accel = Accel(*closed_meshes.MESHES[name], kind=kind, device=device)
         found = {rays: closed_meshes.leaks(accel, name, rays, count // len(closed_meshes.RAYS))
                  for rays in closed_meshes.RAYS}  # fmt: skip
         out, traced = (sum(pair[k] for pair in found.values()) for k in (0, 1))
-        rows.append({"kind": kind, "mesh": name, "rays": traced, "leaks": out,
-                     "leaks_by_rays": {rays: pair[0] for rays, pair in found.items() if pair[0]}})  # fmt: skip
         print(f"{kind:18} {name:20} {out} of {traced:,}  ({time.perf_counter() - start:.1f} s)", flush=True)
-    return rows
+        yield {"kind": kind, "mesh": name, "rays": traced, "leaks": out,
+               "leaks_by_rays": {rays: pair[0] for rays, pair in found.items() if pair[0]}}  # fmt: skip
+
+
+def keep(row: dict[str, Any], target: Path) -> None:
+    """Puts a row into the record, with its date and commit."""
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
+                            check=False).stdout.strip()  # fmt: skip
+    rows = json.loads(target.read_text(encoding="utf-8"))["rows"] if target.exists() else []
+    place = {(old["kind"], old["mesh"]): k for k, old in enumerate(rows)}.get((row["kind"], row["mesh"]), len(rows))
+    rows[place : place + 1] = [row | {"date": datetime.date.today().isoformat(), "commit": commit}]
+    target.parent.mkdir(exist_ok=True)
+    target.write_text(json.dumps({"rows": rows}, indent=1) + "\n", encoding="utf-8")
 
 
 def main() -> int:
@@ -47,14 +58,11 @@ def main() -> int:
     parser.add_argument("--kinds", default=",".join(kind for kind in KINDS if kind != "BRUTE_FORCE"))
     parser.add_argument("--device", default="CPU", type=str.upper, choices=["CPU", "CUDA"])
     options = parser.parse_args()
-    rows = [row for kind in options.kinds.split(",") for row in run(kind, options.device, int(options.rays))]
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
-                            check=False).stdout.strip()  # fmt: skip
-    record = {"date": datetime.date.today().isoformat(), "commit": commit, "device": options.device, "rows": rows}
-    target = ROOT / "tests" / "bench" / "records" / f"leaks-{options.device.lower()}.json"
-    target.parent.mkdir(exist_ok=True)
-    target.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    total = sum(row["leaks"] for row in rows)
+    target, total = ROOT / "tests" / "bench" / "records" / f"leaks-{options.device.lower()}.json", 0
+    for kind in options.kinds.split(","):
+        for row in run(kind, options.device, int(options.rays)):
+            keep(row, target)
+            total += row["leaks"]
     print(f"{total} rays got out; {target.relative_to(ROOT)} written")
     return 1 if total else 0
 
