@@ -42,6 +42,7 @@ TABLE = (
     RenderPass("Denoising Albedo", "RGB", "COLOR", "luch.use_pass_denoising"),
     RenderPass("Denoising Normal", "XYZ", "VECTOR", "luch.use_pass_denoising"),
     RenderPass("Sample Count", "X", "VALUE", "luch.use_pass_sample_count"),
+    RenderPass("Render Time", "X", "VALUE", "luch.use_pass_render_time"),
     RenderPass("Error", "RGB", "COLOR", "luch.use_pass_error"),
 )
 
@@ -56,6 +57,7 @@ NOT_RENDERED = {
 CYCLES_SWITCHES = {
     "luch.use_pass_denoising": "cycles.denoising_store_passes",
     "luch.use_pass_sample_count": "cycles.pass_debug_sample_count",
+    "luch.use_pass_render_time": "cycles.pass_render_time",
 }
 
 CRYPTOMATTE_KINDS = ("Object", "Material", "Asset")

@@ -194,6 +194,9 @@ class LuchViewLayerSettings(bpy.types.PropertyGroup):
     use_pass_sample_count: BoolProperty(
         name="Sample Count", default=False, description="How many paths went through each pixel"
     )
+    use_pass_render_time: BoolProperty(
+        name="Render Time", default=False, description="Milliseconds that a processor or the GPU spent on each pixel"
+    )
 
 
 CLASSES = (LuchSceneSettings, LuchViewLayerSettings)

@@ -158,6 +158,7 @@ class LUCH_VIEWLAYER_PT_passes_data(LuchPanel, bpy.types.Panel):
             column.prop(layer, f"use_pass_{name}")
         column.prop(layer.luch, "use_pass_denoising")
         column.prop(layer.luch, "use_pass_sample_count")
+        column.prop(layer.luch, "use_pass_render_time")
         column.prop(layer.luch, "use_pass_error")
         layout.prop(layer, "pass_alpha_threshold")
 

@@ -174,8 +174,12 @@ py::dict task_fields() {
     LUCH_FIELD(wave.ray_time);
     LUCH_FIELD(wave.next_time);
     LUCH_FIELD(wave.shadow_time);
+    LUCH_FIELD(wave.ticks);
+    LUCH_FIELD(wave.ray_ticks);
+    LUCH_FIELD(wave.shadow_ticks);
     LUCH_FIELD(film.layout.stride);
     LUCH_FIELD(film.layout.marks);
+    LUCH_FIELD(film.layout.time);
     LUCH_FIELD(film.layout.aov_count);
     LUCH_FIELD(film.layout.ambient_occlusion);
 #undef LUCH_FIELD
@@ -192,6 +196,7 @@ py::dict task_sizes() {
     sizes["media"] = sizeof(MediumStack);
     sizes["counters"] = u32(WAVE_COUNTERS);
     sizes["totals"] = u32(TOTALS);
+    sizes["clocks"] = u32(WAVE_CLOCKS);
     return sizes;
 }
 

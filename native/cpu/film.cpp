@@ -51,6 +51,7 @@ const Known known_passes[] = {
     {"Denoising Albedo", 3, PassKind::MEAN, &FilmLayout::denoising_albedo, nothing, DATA_PASS},
     {"Denoising Normal", 3, PassKind::MEAN, &FilmLayout::denoising_normal, nothing, DATA_PASS},
     {"Denoising Depth", 1, PassKind::MEAN, &FilmLayout::denoising_depth, nothing, DATA_PASS},
+    {"Render Time", 1, PassKind::TOTAL, &FilmLayout::time, nothing, NEITHER},
 };
 
 struct KnownCrypto {
@@ -134,7 +135,7 @@ class LayoutBuilder {
                 divisor = layout.*known.divisor;
                 layout.any_data_pass = 1;
             }
-            (known.group == LIGHT_PASS ? layout.any_light_pass : layout.any_data_pass) = 1;
+            if (known.group != NEITHER) (known.group == LIGHT_PASS ? layout.any_light_pass : layout.any_data_pass) = 1;
             passes.push_back({name, known.channels, known.kind, layout.*known.channel, divisor});
             return true;
         }
@@ -241,6 +242,9 @@ void read_pixel(const Pass& pass, const FilmSum* row, const FilmLayout& layout, 
             break;
         case PassKind::MIST:
             out[0] = to_float(std::clamp(1.0 - from[0] * mean, 0.0, 1.0));
+            break;
+        case PassKind::TOTAL:
+            out[0] = to_float(from[0]);
             break;
         case PassKind::SAMPLE_COUNT:
             out[0] = static_cast<float>(samples);

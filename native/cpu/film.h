@@ -36,6 +36,7 @@ enum class PassKind : u8 {
     FIRST,         // as it is
     DEPTH,         // as it is, 0 becomes 1e10
     MIST,          // 1 - mean
+    TOTAL,         // sum, as it is
     SAMPLE_COUNT,
     CRYPTO,        // ids as they are, mean weights, sorted by weight
 };

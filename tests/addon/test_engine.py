@@ -70,7 +70,8 @@ def test_every_pass_arrives_under_blenders_name(room: bpy.types.Scene) -> None:
     switches = [name for name in dir(layer) if name.startswith("use_pass_") and name != "use_pass_grease_pencil"]
     for name in switches:
         setattr(layer, name, True)
-    layer.luch.use_pass_denoising = layer.luch.use_pass_sample_count = layer.luch.use_pass_error = True
+    for name in ("denoising", "sample_count", "render_time", "error"):
+        setattr(layer.luch, f"use_pass_{name}", True)
     for name, kind in (("Mask", "VALUE"), ("Tint", "COLOR")):
         aov = layer.aovs.add()
         aov.name, aov.type = name, kind
@@ -81,6 +82,7 @@ def test_every_pass_arrives_under_blenders_name(room: bpy.types.Scene) -> None:
         "Depth": 1,
         "Normal": 3,
         "Sample Count": 1,
+        "Render Time": 1,
         "Error": 3,
         "CryptoObject00": 4,
         "Mask": 1,

@@ -76,6 +76,19 @@ def test_code_for_what_the_scene_lacks_changes_no_bit(place: str) -> None:
     assert lean.stats["kernel_plan"]["ROUND_LAMPS"]
 
 
+def test_the_render_time_adds_up_to_the_time_of_tracing_and_changes_no_other_pass(place: str) -> None:
+    """On fibers one clock, which all threads share, stands for each one's."""
+    scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
+    without = render(scene)
+    timed = render(replace(scene, film=replace(scene.film, passes=["Combined", "Render Time"])))
+    assert timed.stats["kernel_plan"]["TIME"] and not without.stats["kernel_plan"]["TIME"]
+    assert np.array_equal(without.passes["Combined"], timed.passes["Combined"])
+    milliseconds = timed.passes["Render Time"][..., 0]
+    assert (milliseconds > 0.0).all()
+    assert 1e-3 * milliseconds.sum(dtype=np.float64) == pytest.approx(timed.stats["trace_seconds"], rel=0.05)
+    assert timed.stats["device_film_and_paths_bytes"] > without.stats["device_film_and_paths_bytes"]
+
+
 def test_a_picture_larger_than_a_wave_is_the_same(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
     whole = render(scene)

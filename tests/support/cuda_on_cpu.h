@@ -221,6 +221,7 @@ inline unsigned __reduce_min_sync(unsigned mask, unsigned x) {
         if ((mask >> k & 1u) && unsigned(all[k]) < least) least = unsigned(all[k]);
     return least;
 }
+inline long long clock64() { return (long long)__builtin_ia32_rdtsc(); }  // of all fibers together
 inline int __popc(unsigned x) { return __builtin_popcount(x); }
 inline int __clz(int x) { return x ? __builtin_clz(unsigned(x)) : 32; }
 inline int __ffs(int x) { return __builtin_ffs(x); }

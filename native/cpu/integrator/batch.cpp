@@ -9,7 +9,9 @@
 namespace luch::cpu {
 namespace {
 
-const float* times_of(const std::vector<float>& times) { return times.empty() ? nullptr : times.data(); }
+const float* times_of(const std::vector<float>& times, int from) {
+    return times.empty() ? nullptr : times.data() + from;
+}
 
 }  // namespace
 
@@ -76,6 +78,7 @@ BatchCounts Batch::counts() const {
 }
 
 void Batch::trace(const PixelBlock& block) {
+    if (timed()) clock_.start();
     generate(block);
     while (ray_count_ > 0) {
         next_count_ = 0;
@@ -83,8 +86,10 @@ void Batch::trace(const PixelBlock& block) {
         traverse();
         if (scene_.has_media) cross_media();
         meet_lamps();
+        charge_rays(0, ray_count_);
         shade_misses();
         sort_hits_by_material();
+        charge_rays(0, ray_count_);
         walk_count_ = 0;
         shade_hits();
         if (walk_count_ > 0) walk_subsurface();
@@ -109,6 +114,7 @@ void Batch::generate(const PixelBlock& block) {
                 u32 count = std::min(u32(CAMERA_LANES), block.sample_count - s);
                 generate_pixel(pixel, px, py, block.first_sample + s, count);
             }
+            charge_pixel(row);
         }
     }
     counts_.paths += u64(ray_count_);
@@ -144,7 +150,13 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
 
 void Batch::traverse() {
     for (int k = 0; k < ray_count_; k++) ray_kind_[k] = paths_[ray_path_[k]].visibility;
-    scene_.accel->closest(rays_.data(), ray_kind_.data(), hits_.data(), size_t(ray_count_), times_of(ray_time_));
+    const int at_once = timed() ? TIMED_RAYS : ray_count_;
+    for (int k = 0; k < ray_count_; k += at_once) {
+        const int count = std::min(at_once, ray_count_ - k);
+        scene_.accel->closest(rays_.data() + k, ray_kind_.data() + k, hits_.data() + k, size_t(count),
+                              times_of(ray_time_, k));
+        charge_rays(k, k + count);
+    }
     counts_.rays += u64(ray_count_);
 }
 
@@ -188,6 +200,7 @@ void Batch::shade_world(const u32* queue, int count) {
     }
     for (int i = 0; i < count; i++)
         add_world(scene_, writer_, paths_[ray_path_[queue[i]]], rays_[queue[i]].direction, radiance[i]);
+    charge_queue(queue, count);
 }
 
 void Batch::sort_hits_by_material() {
@@ -221,20 +234,30 @@ void Batch::shade_hits() {
             chunk[count++] = k;
             if (count == SHADE_LANES) {
                 shade_chunk(m, chunk, count);
+                charge_queue(chunk, count);
                 count = 0;
             }
         }
-        if (count > 0) shade_chunk(m, chunk, count);
+        if (count > 0) {
+            shade_chunk(m, chunk, count);
+            charge_queue(chunk, count);
+        }
         begin = end;
     }
 }
 
 void Batch::trace_shadows() {
     if (shadow_count_ == 0) return;
-    scene_.accel->any(shadow_rays_.data(), shadow_kind_.data(), blocked_.data(), size_t(shadow_count_),
-                      times_of(shadow_time_));
+    const int at_once = timed() ? TIMED_RAYS : shadow_count_;
+    for (int k = 0; k < shadow_count_; k += at_once) {
+        const int count = std::min(at_once, shadow_count_ - k);
+        scene_.accel->any(shadow_rays_.data() + k, shadow_kind_.data() + k, blocked_.data() + k, size_t(count),
+                          times_of(shadow_time_, k));
+        charge_shadows(k, k + count);
+    }
     counts_.shadow_rays += u64(shadow_count_);
     OnePoint one{*this};
+    int from = 0;  // whose time was not charged yet
     for (int k = 0; k < shadow_count_; k++) {
         if (!shadow_time_.empty()) one.time = shadow_time_[k];
         const ShadowRay& shadow = shadows_[k];
@@ -244,14 +267,18 @@ void Batch::trace_shadows() {
             if (blocked_[k] == BLOCKED_OPAQUE) continue;
             if (blocked_[k] == BLOCKED_MAYBE) {
                 MediumStack* stack = scene_.has_media ? &shadow_media_[k] : nullptr;
+                charge_shadows(from, k);
                 through = walk_transparent(scene_, shadow_rays_[k], shadow, stack, one, one, scratch_->light_points,
                                            &counts_.transparent_steps, &counts_.shadow_rays);
+                charge_shadows(k, k + 1);
+                from = k + 1;
             } else if (scene_.has_media) {
                 through = media_transmittance(scene_.media, shadow_media_[k], shadow_rays_[k].t_max);
             }
         }
         if (!is_zero(through)) add_direct(scene_, writer_, path, shadow, through);
     }
+    charge_shadows(from, shadow_count_);
 }
 
 }  // namespace luch::cpu

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cpu/accel/accel.h"
+#include "cpu/integrator/pixel_clock.h"
 #include "cpu/integrator/render_scene.h"
 #include "cpu/shade/interpreter.h"
 #include "luch/integrator/subsurface.h"
@@ -83,12 +84,29 @@ class Batch {
     void emission_of_samples(const u32* queue, const int* lanes, int count);
     void push_shadow(bool made, u32 k);
 
+    // The time since the last call goes to those who used it; nothing happens unless the Render Time pass is asked for.
+    bool timed() const { return writer_.film.layout.time != NONE; }
+    void charge_pixel(u32 pixel) {
+        if (timed()) clock_.charge(writer_, 1, [&](int) { return pixel; });
+    }
+    void charge_rays(int begin, int end) {
+        if (timed()) clock_.charge(writer_, end - begin, [&](int i) { return pixel_of(u32(begin + i)); });
+    }
+    void charge_queue(const u32* queue, int count) {
+        if (timed()) clock_.charge(writer_, count, [&](int i) { return pixel_of(queue[i]); });
+    }
+    void charge_shadows(int begin, int end) {
+        if (timed()) clock_.charge(writer_, end - begin, [&](int i) { return paths_[shadows_[begin + i].path].pixel; });
+    }
+    u32 pixel_of(u32 k) const { return paths_[ray_path_[k]].pixel; }
+
     // What the shared headers ask of a device: a light's or a transparent surface's program at one point, and a ray.
     struct OnePoint;
 
     const RenderScene& scene_;
     FilmWriter writer_;
     BatchCounts counts_;
+    PixelClock clock_;
 
     std::vector<PathState> paths_;
     // Rays under way, compact: entry k belongs to path ray_path_[k]. `next_` is the following generation.

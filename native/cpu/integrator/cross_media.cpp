@@ -7,7 +7,10 @@
 namespace luch::cpu {
 
 void Batch::cross_media() {
-    for (int k = 0; k < ray_count_; k++) cross_media(k);
+    for (int k = 0; k < ray_count_; k++) {
+        cross_media(k);
+        charge_rays(k, k + 1);
+    }
 }
 
 void Batch::cross_media(int k) {

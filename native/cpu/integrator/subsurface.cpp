@@ -32,6 +32,7 @@ void Batch::walk_subsurface() {
     for (int i = 0; i < walk_count_; i++) {
         tracer.time = time_of(walks_[size_t(i)].ray);
         pass_inside(scene_.view, walks_[size_t(i)], tracer, &counts_.subsurface_steps);
+        charge_queue(&walks_[size_t(i)].ray, 1);
         if (walks_[size_t(i)].hit.instance == NONE) continue;
         if (exits != i) walks_[size_t(exits)] = walks_[size_t(i)];
         exits++;
@@ -89,6 +90,7 @@ void Batch::shade_exits(u32 material_index, const u32* queue, int count) {
                     &next_rays_[next_count_]))
             send_next(points, lane);
     }
+    charge_queue(rays, count);
 }
 
 }  // namespace luch::cpu

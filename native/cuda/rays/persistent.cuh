@@ -29,6 +29,9 @@
 #ifndef LUCH_ODD_ASIDES
 #define LUCH_ODD_ASIDES 1
 #endif
+#ifndef LUCH_TIMED_RAYS
+#define LUCH_TIMED_RAYS 0  // each ray's clock cycles are told, for the Render Time pass
+#endif
 
 namespace luch {
 
@@ -95,8 +98,24 @@ __device__ __forceinline__ T load_quads(const T* from) {  // 16 bytes at a time,
 // What a lane needs at leaves and at the end alone: in shared memory, so that registers are left for boxes. Each lane
 // has its own and nobody reads another's, so no barrier stands between writing and reading, here and in the stacks'
 // columns. (A test runs the kernel with these arrays private to every thread: the same hits.)
+#if LUCH_TIMED_RAYS
+struct RayClock {
+    long long began;
+    __device__ __forceinline__ void start() { began = clock64(); }
+    template <class Rays>
+    __device__ __forceinline__ void stop(const Rays& rays, u32 index) const {
+        rays.task.ticks[index] = static_cast<u32>(clock64() - began);
+    }
+};
+#else
+struct RayClock {
+    __device__ __forceinline__ void start() {}
+    template <class Rays>
+    __device__ __forceinline__ void stop(const Rays&, u32) const {}
+};
+#endif
 template <Precision P>
-struct Aside {
+struct Aside : RayClock {
     PrimitiveRay<P> tested;
     RefHit best;
     float t_min;
@@ -123,6 +142,7 @@ struct Walker {
     __device__ __forceinline__ void begin(const Rays& rays, u32 i, SplitStack* stack) {
         const Cwbvh& tree = tree_of(rays);
         Ray ray;
+        aside->start();
         busy = load_ray(rays, i, &ray) && tree.node_count != 0;
         aside->index = i;
         aside->best = no_hit(ray);
@@ -138,6 +158,7 @@ struct Walker {
     template <class Rays>
     __device__ __forceinline__ void finish(const Rays& rays) {
         busy = false;
+        aside->stop(rays, aside->index);
         if constexpr (ANY)
             store_blocked(rays, aside->index, blocked);
         else

@@ -9,6 +9,7 @@ __device__ __forceinline__ void shade_exit(const RenderTask& task, const Subsurf
     const Wavefront& wave = task.wave;
     const RenderView& scene = task.scene;
     u32 slot = wave.ray_slot[walk.ray];
+    StageTimer timer(wave, CLOCK_EXITS, slot);
     const Program& program = scene.view.materials[material_at(scene.view, walk.hit.instance, walk.hit.prim)].program;
     PathState path = load_path(wave, slot);
     path.throughput = walk.throughput;

@@ -8,11 +8,13 @@ LUCH_STAGE(find_light) {
     const Wavefront& wave = task.wave;
     u32 k = stage_index();
     if (k >= wave.counters[WAVE_RAYS]) return;
+    if (plan::TIME && wave.ticks) add_ticks(wave, CLOCK_CLOSEST, wave.ray_slot[k], wave.ray_ticks[k]);
     bool missed = missed_all(wave.hits[k]);
     // Lamps that are seen through media: cross_media.
     bool lamps = plan::VISIBLE_LAMPS && task.scene.has_visible_lamps && !(plan::VOLUMES && wave.media);
     if (!missed && !lamps) return;
     u32 slot = wave.ray_slot[k];
+    StageTimer timer(wave, CLOCK_LIGHT, slot);
     PathState path = load_path(wave, slot);
     Ray ray = wave.rays[k];
     FilmWriter writer = film_of_slot(task, slot);

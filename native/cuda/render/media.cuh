@@ -24,6 +24,7 @@ LUCH_STAGE(cross_media) {
     u32 k = stage_index();
     if (k >= wave.counters[WAVE_RAYS]) return;
     u32 slot = wave.ray_slot[k];
+    StageTimer timer(wave, CLOCK_MEDIA, slot);
     PathState path = load_path(wave, slot);
     const MediumStack stack = wave.media[slot];
     Ray ray = wave.rays[k];

@@ -42,6 +42,8 @@ extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK, LUCH_STAGE_BLOCK
     u32 k = stage_index();
     if (k >= wave.counters[WAVE_SHADOWS]) return;
     ShadowRay shadow = wave.shadows[k];
+    if (plan::TIME && wave.ticks) add_ticks(wave, CLOCK_ANY, shadow.path, wave.shadow_ticks[k]);
+    StageTimer timer(wave, CLOCK_SHADOWS, shadow.path);
     PathState path = load_path(wave, shadow.path);
     Color through = shadow_transmittance(task, trees, k, shadow);
     if (is_zero(through)) return;

@@ -1,6 +1,7 @@
 // What the stages of the wavefront share: who a thread is, appending to queues, a program at one point.
 #pragma once
 #include "luch/integrator/wavefront.h"
+#include "render/clock.cuh"
 #include "render/launch.cuh"
 #include "render/programs.cuh"
 

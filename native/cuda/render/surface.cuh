@@ -21,6 +21,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
     const Wavefront& wave = task.wave;
     const RenderView& scene = task.scene;
     u32 k = wave.sorted[entry], slot = wave.ray_slot[k];
+    StageTimer timer(wave, CLOCK_SURFACES, slot);
     Hit hit = wave.hits[k];
     Ray ray = wave.rays[k];
     u32 material_index = material_at(scene.view, hit.instance, hit.prim);

@@ -7,6 +7,9 @@
 #ifndef LUCH_PLAN_MOTION
 #define LUCH_PLAN_MOTION 0  // one module serves many scenes; those in which something moves have another
 #endif
+#ifndef LUCH_TIMED_RAYS
+#define LUCH_TIMED_RAYS 0
+#endif
 #include "luch/accel/two_level.h"
 #include "rays/structure.cuh"
 
@@ -21,6 +24,7 @@ struct TraceTask {
     const u32* count;  // rays
     u32* next;  // 0 when the kernel begins; how many rays were fetched when it ends, at least
     const float* times;  // of each ray; null: the shutter's middle. Read where LUCH_PLAN_MOTION is 1
+    u32* ticks;  // of each ray, its clock cycles. Written where LUCH_TIMED_RAYS is 1
 };
 
 __device__ __forceinline__ u32 ray_count(const TraceTask& task) { return __ldg(task.count); }
@@ -47,7 +51,14 @@ __device__ __forceinline__ void for_each_ray(const TraceTask& task, Trace&& trac
         if (lane == 0) first = atomicAdd(task.next, 32u);
         first = __shfl_sync(0xffffffffu, first, 0);
         if (first >= count) return;
-        if (first + lane < count) trace(first + lane);
+        if (first + lane >= count) continue;
+#if LUCH_TIMED_RAYS
+        long long began = clock64();
+#endif
+        trace(first + lane);
+#if LUCH_TIMED_RAYS
+        task.ticks[first + lane] = static_cast<u32>(clock64() - began);
+#endif
     }
 }
 

@@ -15,7 +15,7 @@ __device__ __forceinline__ u32 ray_count(const SceneRays& rays) { return ray_cou
 __device__ __forceinline__ u32* next_ray(const SceneRays& rays) { return rays.task.next; }
 
 template <Precision P>
-struct SceneAside {
+struct SceneAside : RayClock {
     PrimitiveRay<P> tested;  // in the group's space
     RefHit best;
     float t_min;
@@ -58,6 +58,7 @@ struct SceneWalker {
 
     __device__ __forceinline__ void begin(const SceneRays& rays, u32 i, SplitStack* stack) {
         Ray ray = ray_of(rays.task, i);
+        aside->start();
         busy = clamp_interval(&ray) && rays.scene.top.node_count != 0;
         aside->index = i;
         aside->best = {ray.t_max, NONE, 0.0f, 0.0f};
@@ -72,6 +73,7 @@ struct SceneWalker {
     }
     __device__ __forceinline__ void finish(const SceneRays& rays) {
         busy = false;
+        aside->stop(rays, aside->index);
         if constexpr (ANY) {
             rays.task.blocked[aside->index] = blocked;
             return;

@@ -3,10 +3,14 @@
 #ifndef LUCH_PLAN_MOTION
 #define LUCH_PLAN_MOTION 0  // as in trace.cuh
 #endif
+#ifndef LUCH_PLAN_TIME
+#define LUCH_PLAN_TIME 0
+#endif
 #include "luch/accel/local_trees.h"
 #include "luch/integrator/wavefront.h"
 
 #include "luch/integrator/subsurface_disk.h"
+#include "render/clock.cuh"
 
 namespace luch {
 
@@ -39,9 +43,10 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK, luch::WALK_RESIDE
     u64 steps = 0;
     LocalTracer tracer{*task.scene.local_trees, SHUTTER_MIDDLE};
     SubsurfaceWalk walk;
-    WalkPlan plan;
+    WalkPlan way;
     WalkFate fate = WalkFate::LOST;
     bool walking = false;
+    long long began = 0;
     for (;;) {
         if (!walking) {
             at = atomicAdd(wave.counters + WAVE_WALKED, 1u);
@@ -49,13 +54,17 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK, luch::WALK_RESIDE
             if (wave.walks[at].probe) continue;
             walk = wave.walks[at];
             tracer.time = time_of_ray(wave, walk.ray);
-            plan = begin_walk(walk);
+            way = begin_walk(walk);
             walking = true;
+            if constexpr (plan::TIME) began = clock64();
         }
-        fate = take_step(walk, plan, tracer);
+        fate = take_step(walk, way, tracer);
         ++steps;
         walking = fate == WalkFate::GOES_ON;
-        if (!walking) store_end(wave.walks + at, walk, fate);
+        if (walking) continue;
+        store_end(wave.walks + at, walk, fate);
+        if (plan::TIME && wave.ticks)
+            add_ticks(wave, CLOCK_WALKS, wave.ray_slot[walk.ray], static_cast<u32>(clock64() - began));
     }
     if (steps != 0) atomicAdd(wave.totals + TOTAL_WALK_STEPS, steps);
 }
@@ -68,6 +77,7 @@ extern "C" __global__ void __launch_bounds__(luch::WALK_BLOCK)
     u32 k = blockIdx.x * blockDim.x + threadIdx.x;
     if (k >= wave.counters[WAVE_WALKS] || !wave.walks[k].probe) return;
     SubsurfaceWalk walk = wave.walks[k];
+    StageTimer timer(wave, CLOCK_WALKS, wave.ray_slot[walk.ray]);
     LocalTracer tracer{*task.scene.local_trees, time_of_ray(wave, walk.ray)};
     u64 rays = 0;
     probe_disk(task.scene.view, walk, tracer, &rays);

@@ -75,6 +75,9 @@
 #ifndef LUCH_PLAN_MOTION
 #define LUCH_PLAN_MOTION 1
 #endif
+#ifndef LUCH_PLAN_TIME
+#define LUCH_PLAN_TIME 1
+#endif
 
 namespace luch::plan {
 
@@ -104,6 +107,7 @@ inline constexpr bool CLAMPING = LUCH_PLAN_CLAMPING;
 inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin walls
 inline constexpr bool VOLUMES = LUCH_PLAN_VOLUMES;
 inline constexpr bool MOTION = LUCH_PLAN_MOTION;  // of the camera, of objects, of their shapes
+inline constexpr bool TIME = LUCH_PLAN_TIME;      // the Render Time pass
 
 // A light that was chosen may have a program to ask for its emission.
 inline constexpr bool SAMPLED_PROGRAMS = EMISSION_PROGRAMS || LAMP_PROGRAMS || (WORLD_PROGRAM && WORLD_SAMPLING);

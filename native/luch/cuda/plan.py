@@ -35,6 +35,7 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "CLAMPING": ("clamping",),
     "VOLUMES": ("volumes",),
     "MOTION": ("camera motion", "object motion", "deformation motion"),
+    "TIME": ("pass Render Time",),
 }  # fmt: skip
 # Define -> what the core says of the scene as it will be rendered (core.render.Renderer.device_facts).
 TOLD = {

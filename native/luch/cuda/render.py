@@ -11,6 +11,7 @@ import struct
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from luch._native import core
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.scene_kernels import SceneKernels
+from luch.cuda.timing import TIMED, StageClocks
 from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
 from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, too_large
 
@@ -52,6 +54,7 @@ class Memory:
         self._fields, self._task = fields, bytearray(task)
         stride = self.field("film.layout.stride", "<I")
         aovs = self.field("film.layout.aov_count", "<I")
+        self.timed = self.field("film.layout.time", "<I") != NONE
         shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE) + walks + media
         self.layer_pixels = min(pixels, paths)
         self.layers = max(1, paths // pixels)
@@ -89,6 +92,12 @@ class Memory:
                 "ray_time": empty(slots, np.float32),
                 "next_time": empty(slots, np.float32),
                 "shadow_time": empty(slots * shadows, np.float32),
+            }
+        if self.timed:
+            self.arrays |= {
+                "ticks": cp.zeros((sizes["clocks"], slots), np.uint32),
+                "ray_ticks": empty(slots, np.uint32),
+                "shadow_ticks": empty(slots * shadows, np.uint32),
             }
         if aovs:
             self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
@@ -160,14 +169,17 @@ def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
         first += count
 
 
-def bytes_per_path(stride: int, pixels: int, walks: bool = False, media: bool = False, moves: bool = False) -> float:
+def bytes_per_path(
+    stride: int, pixels: int, walks: bool = False, media: bool = False, moves: bool = False, timed: bool = False
+) -> float:
     """Device memory of one path under way: its state, its queues, and its part of a layer of the film."""
     sizes = core.render.task_sizes()
     shadow = sizes["ray"] + sizes["shadow"] + 5 + media * sizes["media"]
     queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + (2 + walks + media) * shadow
     beside = walks * sizes["walk"] + media * sizes["media"]
     times = 4 * (4 + walks + media) * moves
-    return float(sizes["path"] + queues + beside + times + 8 * stride + 4)
+    ticks = 4 * (sizes["clocks"] + 3 + walks + media) * timed
+    return float(sizes["path"] + queues + beside + times + ticks + 8 * stride + 4)
 
 
 def _told_images(sizes: list[int]) -> list[str]:
@@ -254,6 +266,7 @@ class DeviceRenderer(HostFilm):
         self._trace_seconds = 0.0
         self._upload_seconds = 0.0
         self._merged = True
+        self._timed = "Render Time" in scene.film.passes
         self.warnings: list[str] = []
 
     @property
@@ -282,9 +295,10 @@ class DeviceRenderer(HostFilm):
         facts, blocks = self._upload()
         self._upload_seconds = time.perf_counter() - began
         self._paths = load("RENDER_PATHS", self._scene.settings.precision)
+        self._clocks = StageClocks()
         self._stages = SceneKernels(facts, blocks, self._scene)
         self._walks = (
-            load("RENDER_WALKS", self._scene.settings.precision, MOVING * facts["moves"])
+            load("RENDER_WALKS", self._scene.settings.precision, MOVING * facts["moves"] + TIMED * self._timed)
             if facts["subsurface"]
             else None
         )
@@ -301,7 +315,7 @@ class DeviceRenderer(HostFilm):
         self._arrays = DeviceCopy(blocks, links, left_images)
         self.warnings = _told_images([len(blocks[number][1]) for number in left_images])
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
-                                   facts["one_group"], left, depth, facts["trees_move"])  # fmt: skip
+                                   facts["one_group"], left, depth, facts["trees_move"], self._timed)  # fmt: skip
         return facts, blocks
 
     def _images_to_leave(self, blocks: Blocks, tree_blocks: Blocks, left: Left) -> set[int]:
@@ -324,7 +338,8 @@ class DeviceRenderer(HostFilm):
         stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
         walks, media = self._walks is not None, self._media
         fits = int(
-            (free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, pixels, walks, media, moves)
+            (free * MEMORY_SHARE - pixels * (8 * stride + 4))
+            / bytes_per_path(stride, pixels, walks, media, moves, self._timed)
         )
         samples = max(1, self._scene.settings.samples)
         paths = min(MOST_PATHS, fits, pixels * samples)
@@ -372,7 +387,7 @@ class DeviceRenderer(HostFilm):
             self._memory.mark(sample)
 
     def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int) -> None:
-        memory, rays = self._memory, pixels * samples
+        memory, rays, began = self._memory, pixels * samples, time.perf_counter()
         self._merged = False
         self._counts["paths"] += rays
         self._launch(self._paths.kernel("begin_paths"), 0, rays, struct.pack("<4I", pixel, pixels, sample, samples))
@@ -385,6 +400,8 @@ class DeviceRenderer(HostFilm):
             self._counts["shadow_rays"] += shadows
             turn ^= 1
             rays = memory.count("rays")
+        if self._timed:
+            self._clocks.charge(memory, pixel, pixels, samples, time.perf_counter() - began)
 
     def _trace_round(self, turn: int, rays: int) -> int:
         """One event of every path; returns how many shadow rays were cast."""
@@ -392,23 +409,30 @@ class DeviceRenderer(HostFilm):
         following = "next_" if turn else ""
         own_rays = memory.address(f"{following}rays")
         kinds = memory.address("next_kind" if turn else "ray_kind")
-        self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"), memory.counter("traced"),
-                             memory.address("next_time" if turn else "ray_time"))  # fmt: skip
+        with self._clock("closest"):
+            self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"),
+                                 memory.counter("traced"), memory.address("next_time" if turn else "ray_time"),
+                                 memory.address("ray_ticks"))  # fmt: skip
         shadows = 0
         if self._media:
-            self._launch(stages.kernel("cross_media"), turn, rays)
+            with self._clock("media"):
+                self._launch(stages.kernel("cross_media"), turn, rays)
             shadows += self._cast_shadows(turn)
-        self._launch(stages.kernel("find_light"), turn, rays)
+        with self._clock("light"):
+            self._launch(stages.kernel("find_light"), turn, rays)
         self._launch(paths.kernel("count_materials"), turn, rays)
         self._launch(paths.kernel("place_materials"), turn, 1)
         self._launch(paths.kernel("sort_hits"), turn, rays)
-        self._launch(stages.kernel("shade_surfaces"), turn, rays)
+        with self._clock("surfaces"):
+            self._launch(stages.kernel("shade_surfaces"), turn, rays)
         if self._walks is not None and (walks := memory.count("walks")):
             shadows += self._cast_shadows(turn)
             kernel = self._walks.kernel("walk_subsurface")
-            kernel.launch(min(kernel.resident_blocks(BLOCK), -(-walks // BLOCK)), BLOCK, [memory.tasks[turn]])
-            self._launch(self._walks.kernel("probe_profiles"), turn, walks)
-            self._launch(stages.kernel("shade_exits"), turn, walks)
+            with self._clock("walks"):
+                kernel.launch(min(kernel.resident_blocks(BLOCK), -(-walks // BLOCK)), BLOCK, [memory.tasks[turn]])
+                self._launch(self._walks.kernel("probe_profiles"), turn, walks)
+            with self._clock("exits"):
+                self._launch(stages.kernel("shade_exits"), turn, walks)
         shadows += self._cast_shadows(turn)
         self._launch(paths.kernel("next_round"), turn, 1)
         return shadows
@@ -422,12 +446,17 @@ class DeviceRenderer(HostFilm):
         memory = self._memory
         shadows = memory.count("shadows")
         if shadows:
-            self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"), memory.address("blocked"),
-                             memory.counter("shadows"), memory.counter("shadowed"),
-                             memory.address("shadow_time"))  # fmt: skip
-            self._launch(self._stages.kernel("add_shadows"), turn, shadows, self._tracer.root)
+            with self._clock("any"):
+                self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"),
+                                 memory.address("blocked"), memory.counter("shadows"), memory.counter("shadowed"),
+                                 memory.address("shadow_time"), memory.address("shadow_ticks"))  # fmt: skip
+            with self._clock("shadows"):
+                self._launch(self._stages.kernel("add_shadows"), turn, shadows, self._tracer.root)
             memory.clear("shadows", "shadowed")
         return shadows
+
+    def _clock(self, stage: str) -> AbstractContextManager[None]:
+        return self._clocks.running(stage) if self._timed else nullcontext()
 
     def _launch(self, kernel: Any, turn: int, threads: int, *more: bytes) -> None:
         kernel.launch(-(-threads // BLOCK), BLOCK, [self._memory.tasks[turn], *more])

@@ -15,6 +15,7 @@ from luch.cuda.upload import Blocks, DeviceCopy, Links
 
 BLOCK = 128  # RAY_BLOCK of rays/structure.cuh
 MOVING = ("-DLUCH_PLAN_MOTION=1",)
+TIMED_RAYS = ("-DLUCH_TIMED_RAYS=1",)
 HIT = np.dtype([("t", "<f4"), ("prim", "<i4"), ("instance", "<i4"), ("u", "<f4"), ("v", "<f4")])  # luch::Hit; -1: NONE
 
 
@@ -49,14 +50,15 @@ class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
     def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, one_group: bool, left: Left = (),
-                 depth: int = 0, moves: bool = False) -> None:  # fmt: skip
+                 depth: int = 0, moves: bool = False, timed: bool = False) -> None:  # fmt: skip
         """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for.
 
-        left: groups that the device builds, if any; depth: of the trees that were built; moves: something in them does.
+        left: groups that the device builds, if any; depth: of the trees that were built; moves: something in them does;
+        timed: `ticks` of closest() and any() are written.
         May raise TreesTooDeep.
         """
         self._trees = upload_trees(blocks, links, left, depth)
-        self._module = load(f"TRACE_{kind}", precision, MOVING if moves else ())
+        self._module = load(f"TRACE_{kind}", precision, MOVING * moves + TIMED_RAYS * timed)
         one = "_one" if one_group and kind == "CWBVH" else ""
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
 
@@ -74,20 +76,24 @@ class SceneTracer:
         """One of the module's."""
         return self._module.kernel(name)
 
-    def closest(self, rays: int, kinds: int, hits: int, count: int, following: int, times: int = 0) -> None:
+    def closest(
+        self, rays: int, kinds: int, hits: int, count: int, following: int, times: int = 0, ticks: int = 0
+    ) -> None:
         """Puts it on the current stream. All are addresses on the device.
 
         rays: 32 bytes each (luch::Ray), 16 bytes aligned; kinds: uint32 each, or 0; hits: HIT each; count: uint32, how
-        many; following: uint32, must be 0 when the kernel begins; times: float32 each, or 0.
+        many; following: uint32, must be 0 when the kernel begins; times: float32 each, or 0; ticks: uint32 each, or 0.
         """
-        self._launch(self._closest, rays, kinds, hits, 0, count, following, times)
+        self._launch(self._closest, rays, kinds, hits, 0, count, following, times, ticks)
 
-    def any(self, rays: int, kinds: int, blocked: int, count: int, following: int, times: int = 0) -> None:
+    def any(
+        self, rays: int, kinds: int, blocked: int, count: int, following: int, times: int = 0, ticks: int = 0
+    ) -> None:
         """As above. blocked: uint8 each, luch::Blocked."""
-        self._launch(self._any, rays, kinds, 0, blocked, count, following, times)
+        self._launch(self._any, rays, kinds, 0, blocked, count, following, times, ticks)
 
     def _launch(self, kernel: Kernel, *task: int) -> None:
-        kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, [self._trees.root, struct.pack("<7Q", *task)])
+        kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, [self._trees.root, struct.pack("<8Q", *task)])
 
     def closest_of(self, rays: Any, kinds: Any = None, kernel: str = "", times: Any = None) -> Any:
         """rays (N, 8) float32, kinds (N,) uint32 or None, times (N,) float32 or None: NumPy in, HIT (N,) out.
@@ -119,6 +125,6 @@ class SceneTracer:
             counts[1:] = 0
             outputs = (0, results.data.ptr) if blocked else (results.data.ptr, 0)
             self._launch(kernel, rays.data.ptr, 0 if kinds is None else kinds.data.ptr, *outputs, counts.data.ptr,
-                         counts.data.ptr + 4, 0 if times is None else times.data.ptr)  # fmt: skip
+                         counts.data.ptr + 4, 0 if times is None else times.data.ptr, 0)  # fmt: skip
 
         return results, run

@@ -18,6 +18,7 @@ PASSES = {
     "Volume Direct": 3, "Volume Indirect": 3,
     "Emission": 3, "Environment": 3, "Ambient Occlusion": 3, "Denoising Albedo": 3, "Denoising Normal": 3,
     "Sample Count": 0,
+    "Render Time": 1,
     "Error": 0,  # from what the estimate of the error keeps
 }  # fmt: skip
 _COUNTS_BYTES = 4  # samples of a pixel

@@ -29,6 +29,7 @@ struct FilmLayout {
     u32 denoising_albedo, denoising_normal, denoising_depth;
     u32 lightgroups;  // 3 per light group
     u32 aovs;         // 4 per AOV, a value in the first
+    u32 time;         // milliseconds that its paths took
     u32 crypto_object, crypto_material, crypto_asset;  // pairs of id and weight
     u32 lightgroup_count, aov_count, crypto_slots;  // 0: none asked for
     // What a path need not look for: light passes (direct, indirect, emission, environment, AO, light

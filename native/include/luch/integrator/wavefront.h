@@ -34,6 +34,19 @@ enum WaveTotal : u32 {
     TOTALS
 };
 
+// Kernels whose threads tell how long they worked, for the Render Time pass.
+enum WaveClock : u32 {
+    CLOCK_CLOSEST,
+    CLOCK_ANY,
+    CLOCK_MEDIA,
+    CLOCK_LIGHT,
+    CLOCK_SURFACES,
+    CLOCK_WALKS,
+    CLOCK_EXITS,
+    CLOCK_SHADOWS,
+    WAVE_CLOCKS
+};
+
 // 16 bytes of every path stand together, so that neighbouring threads read neighbouring memory.
 struct alignas(16) PathWord {
     u32 w[4];
@@ -71,6 +84,9 @@ struct Wavefront {
     float* ray_time;  // of rays, next_rays, shadow_rays: 0 to 1 while the shutter is open. Null: nothing moves
     float* next_time;
     float* shadow_time;
+    u32* ticks;         // clock cycles, [WaveClock * slots + slot]. Null: the pass is not asked for
+    u32* ray_ticks;     // of rays in the closest kernel
+    u32* shadow_ticks;  // of shadow rays
 };
 
 LUCH_FN float time_of_ray(const Wavefront& wave, u32 k) {
