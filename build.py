@@ -59,6 +59,12 @@ def _parser() -> argparse.ArgumentParser:
 
     test = add("test", "Run the tests. Other arguments go to pytest, e.g. -k lights.", passes_on=True)
     test.add_argument("--sanitize", action="store_true", help="only tests/native, with AddressSanitizer and UBSan")
+    fuzz = add(
+        "fuzz", "Random scenes and damaged files, for as long as you like. --count, --kinds too.", passes_on=True
+    )
+    fuzz.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
+    fuzz.add_argument("--seed", type=int, default=0, help="the first seed; each is a case of every kind")
+    fuzz.add_argument("--sanitize", action="store_true", help="with AddressSanitizer and UBSan")
     bench = add("bench", "Race and compare; other arguments go to the bench. No name: list them.", passes_on=True)
     bench.add_argument("name", nargs="?", help="a file in tests/bench, without .py")
     add("check", "The gate of the house: format, lint, spelling, architecture, types, headers.")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 from pathlib import Path
-from typing import List
+from typing import Dict, List
 
 from buildtools.compile_core import compile_core, compile_sanitized
 from buildtools.failure import BuildFailure
@@ -63,23 +64,42 @@ def test(arguments: Arguments) -> int:
     return status([str(VENV_PYTHON), "-m", "pytest", *arguments.rest])
 
 
-def _test_sanitized(arguments: Arguments) -> int:
-    """tests/native with every memory access and every undefined operation watched."""
-    ensure_environment()
-    folder = compile_sanitized(arguments.jobs)
+def _sanitized_environment() -> Dict[str, str]:
+    """For a process that imports the core that `compile_sanitized` made."""
     # Python itself is not built with it; the C++ library must be there when it looks for what throws.
     libraries = [output(["c++", f"-print-file-name={name}"]) for name in ("libasan.so", "libstdc++.so")]
-    watched = {
+    return {
         "LD_PRELOAD": " ".join(str(library) for library in libraries),
         "ASAN_OPTIONS": "detect_leaks=0",  # Python's own, at exit
         "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1",
         "LUCH_ISA": "v3",
     }
+
+
+def _test_sanitized(arguments: Arguments) -> int:
+    """tests/native with every memory access and every undefined operation watched."""
+    ensure_environment()
+    folder = compile_sanitized(arguments.jobs)
+    watched = _sanitized_environment()
     command = [str(VENV_PYTHON), "-m", "pytest", "-o", f"pythonpath={folder} . tests", "-p", "no:cacheprovider"]
     command.append("--capture=sys")  # what a sanitizer writes before it ends the process is seen
     # The CUDA kernels run there on fibers, whose stacks AddressSanitizer does not know, and from the source tree.
     command += ["-m", "not long", "--ignore", "tests/native/test_accel_cuda.py", "tests/native"]
     return status([*command, *arguments.rest], extra=watched)
+
+
+def fuzz(arguments: Arguments) -> int:
+    """tests/fuzz, for as long as is asked for. 1 if something was found."""
+    if arguments.sanitize:
+        ensure_environment()
+        core, watched = compile_sanitized(arguments.jobs), _sanitized_environment()
+    else:
+        _prepare(arguments)
+        core, watched = NATIVE, {}
+    folders = [str(folder) for folder in (core, ROOT, ROOT / "tests")]
+    extra = {**watched, "PYTHONPATH": os.pathsep.join(folders)}
+    options = ["--seconds", str(arguments.seconds), "--seed", str(arguments.seed), *arguments.rest]
+    return status([str(VENV_PYTHON), "-m", "fuzz.runner", *options], extra=extra)
 
 
 def bench(arguments: Arguments) -> int:

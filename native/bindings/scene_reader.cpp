@@ -40,14 +40,36 @@ u32 lightgroup_index(const std::vector<std::string>& groups, const std::string& 
     return 0;
 }
 
-Domain read_domain(const std::string& name) {
+Domain read_domain(const std::string& name, const std::string& mesh) {
     if (name == "POINT") return Domain::POINT;
     if (name == "CORNER") return Domain::CORNER;
     if (name == "FACE") return Domain::FACE;
     if (name == "MESH") return Domain::MESH;
     if (name == "SPHERE") return Domain::SPHERE;
     if (name == "NONE") return Domain::NONE_;
-    throw std::invalid_argument("Unknown attribute domain \"" + name + "\".");
+    throw std::invalid_argument("Mesh \"" + mesh + "\": the domain \"" + name + "\" of an attribute is not known.");
+}
+
+constexpr py::ssize_t ROWS = 3, COLUMNS = 4;  // of an affine matrix
+
+Array<double> read_matrix(const py::object& source, const std::string& owner) {
+    auto matrix = py::cast<Array<double>>(source);
+    if (matrix.size() != ROWS * COLUMNS) throw std::invalid_argument(owner + ": its matrix must be (3, 4).");
+    return matrix;
+}
+
+// Reads what `owner` names; what Python cannot turn into the number, the text or the array that is wanted, is told so.
+template <class Read>
+void named(const std::string& owner, Read&& read) {
+    const char* remedy = " Export the scene again.";
+    try {
+        read();
+    } catch (const py::cast_error&) {
+        throw std::invalid_argument(owner + " holds a number out of its range, or of another kind." + remedy);
+    } catch (py::error_already_set& error) {
+        if (!error.matches(PyExc_TypeError) && !error.matches(PyExc_ValueError)) throw;
+        throw std::invalid_argument(owner + " holds what cannot be read (" + error.what() + ")." + remedy);
+    }
 }
 
 struct Reader {
@@ -107,7 +129,9 @@ struct Reader {
         }
         if (!mesh.attr("normals").is_none()) {
             auto normals = keep.array<float>(mesh.attr("normals"));
-            in.normals_domain = read_domain(py::cast<std::string>(mesh.attr("normals_domain")));
+            in.normals_domain = read_domain(py::cast<std::string>(mesh.attr("normals_domain")), in.name);
+            if (in.normals_domain != Domain::POINT && in.normals_domain != Domain::CORNER)
+                throw std::invalid_argument("Mesh \"" + in.name + "\": normals are of its points or corners.");
             size_t rows = in.normals_domain == Domain::POINT ? in.vertex_count : in.triangle_count * 3;
             if (size_t(normals.size()) != rows * 3) {
                 throw std::invalid_argument("Mesh \"" + in.name + "\": normals do not fit their domain.");
@@ -120,9 +144,11 @@ struct Reader {
             cpu::AttributeInput a;
             a.name = py::cast<std::string>(item.first);
             a.data = data.data();
+            if (data.ndim() != 1 && data.ndim() != 2)
+                throw std::invalid_argument("Mesh \"" + in.name + "\": attribute \"" + a.name + "\" must be (N, C).");
             a.rows = size_t(data.shape(0));
             a.channels = data.ndim() > 1 ? u32(data.shape(1)) : 1u;
-            a.domain = read_domain(py::cast<std::string>(attribute.attr("domain")));
+            a.domain = read_domain(py::cast<std::string>(attribute.attr("domain")), in.name);
             in.attributes.push_back(a);
         }
         read_mesh_motion(mesh, keep, in);
@@ -309,7 +335,7 @@ struct Reader {
                    : shape == "RECTANGLE" ? Shape::RECTANGLE
                    : shape == "DISK"      ? Shape::DISK
                                           : Shape::ELLIPSE;
-        auto matrix = py::cast<Array<double>>(light.attr("matrix"));
+        auto matrix = read_matrix(light.attr("matrix"), "Light \"" + py::cast<std::string>(light.attr("name")) + "\"");
         for (int i = 0; i < 12; i++) {
             double value = matrix.data()[i];
             in.matrix.m[i] = float(i % 4 == 3 ? value - input.origin[i / 4] : value);
@@ -403,7 +429,7 @@ struct Reader {
         cpu::CameraSpec spec;
         auto number = [&](const char* name) { return py::cast<double>(camera.attr(name)); };
         spec.kind = py::cast<std::string>(camera.attr("kind"));
-        auto matrix = py::cast<Array<double>>(camera.attr("matrix"));
+        auto matrix = read_matrix(camera.attr("matrix"), "Camera");
         std::copy(matrix.data(), matrix.data() + 12, spec.matrix);
         spec.lens_mm = number("lens_mm");
         spec.sensor_width_mm = number("sensor_width_mm");
@@ -514,22 +540,23 @@ ReadScene read_scene(const py::object& scene) {
     }
     auto origin = py::cast<std::array<double, 3>>(scene.attr("origin"));
     std::copy(origin.begin(), origin.end(), out.input.origin);
-    auto each = [&](const char* name, void (Reader::*read)(const py::object&)) {
-        for (auto item : py::cast<py::list>(scene.attr(name))) {
-            (reader.*read)(py::reinterpret_borrow<py::object>(item));
+    auto each = [&](const char* list, const std::string& kind, void (Reader::*read)(const py::object&)) {
+        for (auto item : py::cast<py::list>(scene.attr(list))) {
+            auto one = py::reinterpret_borrow<py::object>(item);
+            named(kind + " \"" + py::cast<std::string>(one.attr("name")) + "\"", [&] { (reader.*read)(one); });
         }
     };
-    each("meshes", &Reader::read_mesh);
-    each("materials", &Reader::read_material);
-    each("objects", &Reader::read_object);
-    out.dropped_instances = reader.read_instances(scene.attr("instances"));
-    each("images", &Reader::read_image);
-    each("lights", &Reader::read_lamp);
-    reader.read_world(scene.attr("world"));
-    reader.read_film(film);
-    reader.read_settings(scene.attr("settings"));
-    reader.read_camera(scene.attr("camera"), film);
-    reader.read_shutter(scene.attr("shutter"));
+    each("meshes", "Mesh", &Reader::read_mesh);
+    each("materials", "Material", &Reader::read_material);
+    each("objects", "Object", &Reader::read_object);
+    named("Instances", [&] { out.dropped_instances = reader.read_instances(scene.attr("instances")); });
+    each("images", "Image", &Reader::read_image);
+    each("lights", "Light", &Reader::read_lamp);
+    named("World", [&] { reader.read_world(scene.attr("world")); });
+    named("Film", [&] { reader.read_film(film); });
+    named("Settings", [&] { reader.read_settings(scene.attr("settings")); });
+    named("Camera", [&] { reader.read_camera(scene.attr("camera"), film); });
+    named("Shutter", [&] { reader.read_shutter(scene.attr("shutter")); });
     return out;
 }
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from luch import accuracy, ledger
 from luch._native import core
+from luch.check import check_scene
 from luch.curve import Curve, Forecast, correction, next_target
 from luch.effects import effects_of
 from luch.effects.removal import without
@@ -255,6 +256,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
 
         return render_verified(scene, progress=progress)
     start = time.perf_counter()
+    check_scene(scene)
     effects = effects_of(scene).as_dict()
     scene = without(scene, scene.settings.without_effects)
     own = [name for name in scene.film.passes if name != ERROR_PASS or name in (aov for aov, _ in scene.film.aovs)]

@@ -10,7 +10,9 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import math
 import os
+import tokenize
 import types
 import typing
 import zipfile
@@ -30,6 +32,12 @@ FORMAT = "luch scene"
 VERSION = 2
 OLDEST = 2  # version 1 did not name the operations of its shader programs
 HEADER = "scene.json"
+# What zipfile and json raise for bytes that make no sense to them. RuntimeError: encrypted, nested too deep; OSError:
+# told to read before the beginning.
+_BROKEN_ARCHIVE = (
+    zipfile.BadZipFile, zlib.error, KeyError, ValueError, EOFError, NotImplementedError, RuntimeError, OverflowError,
+    OSError,
+)  # fmt: skip
 
 
 class SceneFileError(ValueError):
@@ -57,19 +65,29 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 def read_scene(path: str | os.PathLike[str]) -> Scene:
     """Reads a scene. Raises SceneFileError if the file is damaged or not a scene, OSError if it is not there."""
     name = os.fspath(path)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            header = json.loads(archive.read(HEADER))
-            _check_header(header, name)
-            decoder = _Decoder(archive)
-            scene = decoder.decode(header["scene"], Scene, "Scene")
-            _renumber(decoder.programs, header.get("operations"))
-    except SceneFileError:
-        raise
-    except _Damage as damage:
-        raise SceneFileError(f"{name}: {damage}. Export the scene again.") from damage
-    except (zipfile.BadZipFile, zlib.error, KeyError, ValueError, EOFError, NotImplementedError, RuntimeError) as error:
-        raise SceneFileError(f"{name}: this is not a whole .luch file ({error}). Export the scene again.") from error
+    with open(path, "rb") as stream:
+        try:
+            return _read(stream, name)
+        except SceneFileError:
+            raise
+        except _Damage as damage:
+            raise SceneFileError(f"{name}: {damage}. Export the scene again.") from damage
+        except _BROKEN_ARCHIVE as error:
+            raise SceneFileError(
+                f"{name}: this is not a whole .luch file ({error}). Export the scene again."
+            ) from error
+
+
+def _read(stream: typing.BinaryIO, name: str) -> Scene:
+    with zipfile.ZipFile(stream) as archive:
+        for info in archive.infolist():  # others unpack without bound
+            if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise _Damage(f"{info.filename} is packed in a way that Luch does not use")
+        header = json.loads(archive.read(HEADER))
+        _check_header(header, name)
+        decoder = _Decoder(archive)
+        scene = decoder.decode(header["scene"], Scene, "Scene")
+        _renumber(decoder.programs, header.get("operations"))
     assert isinstance(scene, Scene)
     return scene
 
@@ -176,8 +194,10 @@ class _Decoder:
             pairs = zip(items, arguments, strict=True)
             return tuple(self.decode(item, kind, f"{where}[{i}]") for i, (item, kind) in enumerate(pairs))
         if origin is dict:
-            items = _expect(_expect(value, dict, where).get("map"), list, where)
-            return {key: self.decode(item, arguments[1], f"{where}[{key!r}]") for key, item in items}
+            pairs = _expect(_expect(value, dict, where).get("map"), list, where)
+            if not all(isinstance(pair, list) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
+                raise _Damage(f"{where} holds something else than pairs of a name and a value")
+            return {key: self.decode(item, arguments[1], f"{where}[{key!r}]") for key, item in pairs}
         if hint is float and isinstance(value, int) and not isinstance(value, bool):
             return float(value)
         return _expect(value, hint, where)
@@ -211,11 +231,10 @@ class _Decoder:
         member = _expect(_expect(value, dict, where).get("array"), str, where)
         if member not in self._arrays:
             try:
-                data = io.BytesIO(self._archive.read(member))
-                self._arrays[member] = np.lib.format.read_array(data, allow_pickle=False)
+                self._arrays[member] = _array(self._archive.read(member))
             except KeyError as error:
                 raise _Damage(f"{where}: {member} is missing from the file") from error
-            except ValueError as error:
+            except _NO_ARRAY as error:
                 raise _Damage(f"{where}: {member} is not an array ({error})") from error
         array = self._arrays[member]
         dtypes = [_dtype(hint) for hint in allowed]
@@ -223,6 +242,24 @@ class _Decoder:
             expected = " or ".join(str(dtype) for dtype in dtypes)
             raise _Damage(f"{where} holds {array.dtype} numbers, not {expected}")
         return array
+
+
+# What numpy raises for a header that is none: it reads it as Python's source.
+_NO_ARRAY = (ValueError, TypeError, SyntaxError, OverflowError, MemoryError, RecursionError, tokenize.TokenError)
+
+
+def _array(data: bytes) -> NDArray[Any]:
+    """The array of a .npy member, if its header speaks of exactly as many bytes as there are."""
+    stream = io.BytesIO(data)
+    version = np.lib.format.read_magic(stream)
+    if version != (1, 0):
+        raise ValueError(f"version {version}")
+    shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(stream)
+    announced, there = math.prod(shape) * dtype.itemsize, len(data) - stream.tell()
+    if dtype.hasobject or min(shape, default=0) < 0 or announced != there:
+        raise ValueError(f"{announced} bytes of {dtype} are announced, {there} are there")
+    flat = np.frombuffer(data, dtype, offset=stream.tell()).copy()
+    return flat.reshape(shape, order="F" if fortran_order else "C")
 
 
 def _hints(kind: type) -> dict[str, Any]:

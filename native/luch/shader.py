@@ -37,6 +37,7 @@ from luch.shader_code import (
     program_flags,
     run_constant,
     schedule,
+    word_float,
 )
 
 __all__ = [
@@ -86,7 +87,7 @@ class ProgramBuilder:
         if bits not in self._constants:
             value = self._new(1)
             self._constants[bits] = value
-            self._constant_of[value] = float(np.float32(x))
+            self._constant_of[value] = word_float(bits)
         return self._constants[bits]
 
     def vector(self, x: float, y: float, z: float) -> Vector:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -69,8 +70,16 @@ class Node:
 
 
 def float_word(x: float) -> int:
-    """The 32 bits of a float, as a static word."""
-    return int(struct.unpack("<I", struct.pack("<f", x))[0])
+    """The 32 bits of a float, as a static word. Beyond the range of float32 it is infinite."""
+    try:
+        return int(struct.unpack("<I", struct.pack("<f", x))[0])
+    except OverflowError:
+        return float_word(math.copysign(math.inf, x))
+
+
+def word_float(bits: int) -> float:
+    """The float of a static word."""
+    return float(struct.unpack("<f", struct.pack("<I", bits))[0])
 
 
 def constant_emission(closures: Sequence[Node], constant_of: Mapping[int, float]) -> tuple[float, float, float] | None:
