@@ -90,6 +90,23 @@ def _parser() -> argparse.ArgumentParser:
     merging.add_argument("--mergeable", action="store_true", help="keep the sums, to merge on")
     merging.set_defaults(run=_merge)
 
+    reporting = commands.add_parser(
+        "report", help="what accuracy costs in a scene: error against time, effects' prices"
+    )
+    reporting.add_argument("scene", type=Path, help="a .luch file")
+    reporting.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER", help="made if it is not there")
+    reporting.add_argument("--seconds", type=_positive(float), default=60.0, help="how long it may take (default: 60)")
+    reporting.add_argument(
+        "--size", type=_positive(int), default=0, help="pixels along the longer side (default: as the time allows)"
+    )
+    reporting.add_argument(
+        "--device", type=str.upper, choices=("CPU", "CUDA"), help="what computes (default: the scene's)"
+    )
+    reporting.add_argument("--threads", type=int, help="0: one per processor")
+    reporting.add_argument("--progress", action="store_true", help="a line of JSON on stdout about twice a second")
+    reporting.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    reporting.set_defaults(run=_report)
+
     info = commands.add_parser("info", help="say what is in a scene")
     info.add_argument("scene", type=Path, help="a .luch file")
     info.set_defaults(run=_info)
@@ -177,6 +194,13 @@ def _merge(options: argparse.Namespace) -> int:
     image.write_exr(options.output, passes, metadata=metadata)
     print(f"{options.output}: {len(parts)} renders, {record.line(stats)}")
     return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    from luch.report import command
+
+    with _Interrupt() as interrupt:
+        return command.run(options, read_scene(options.scene), lambda: not interrupt.asked)
 
 
 def _override(scene: Scene, options: argparse.Namespace) -> None:

@@ -1,0 +1,344 @@
+"""A report within a time: what is rendered when, until the seconds that the user gives are used up.
+
+First a pilot tells how fast the scene renders, and by that how large the small picture may be. Then comes the
+reference, in two halves of other seeds, and then rounds: in each every way to render takes one render with the round's
+seed, the scene as it is set again and again between them, so that what a busy machine does to the time hits all alike.
+Two rounds are the least that tells bias from noise. What does not fit into two is left out, the least telling first.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from luch import denoise
+from luch.effects import effects_of
+from luch.render import film_pixels
+from luch.report.plan import AS_SET, EXACT, Plan, Variant, plan
+from luch.report.results import Point, Report, Row
+from luch.report.shots import GoesOn, Shot, scaled, shoot, size_of
+from luch.report.tally import (
+    Measured,
+    Tally,
+    brightness_of,
+    fit_errors,
+    fit_noise,
+    floor_of,
+    noise_of,
+    relative_error,
+    weights,
+)
+from luch.scene import Scene
+
+PILOT_SIZE, PILOT_SAMPLES = 48, 4  # pixels along the longer side
+PILOT_SECONDS, PILOT_GROWTH = 0.1, 8
+LEAST_SIZE, MOST_SIZE = 32, 320  # pixels along the longer side
+LEAST_SAMPLES, MOST_SAMPLES = 8, 256
+LEAST_ROUNDS, GOOD_ROUNDS, MOST_ROUNDS = 2, 4, 16
+REFERENCE_SHARE = 0.25  # of the time
+WRITING_SECONDS = 1.0  # kept for statistics and files
+WRITING_SHARE = 0.04
+LEAST_SECONDS_TO_FILTER = 3.0  # of a report: loading the filter and timing it take half a second
+ANCHOR_EVERY = 6  # renders, between two of the scene as it is set
+AVERAGE_COST = 1.3  # of all ways to render, over the scene as it is set
+REFERENCE_SEEDS = (0x5EED0001, 0x5EED0002)
+FIRST_SEED = 1000
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Told:
+    """Progress of a report."""
+
+    doing: str
+    fraction: float
+    seconds: float
+    remaining_seconds: float
+
+
+Watch = Callable[[Told], bool]
+
+
+@dataclass
+class _Found:
+    """What is known of one variant so far."""
+
+    variant: Variant
+    tallies: dict[int, Tally] = field(default_factory=dict)  # by samples
+    errors: dict[int, list[float]] = field(default_factory=dict)  # relMSE against the reference, by samples
+    differences: Tally = field(default_factory=Tally)
+    build: list[float] = field(default_factory=list)
+    trace: list[float] = field(default_factory=list)  # seconds
+    ratios: list[float] = field(default_factory=list)  # to the scene as it is set
+
+
+class Cancelled(Exception):
+    """The user wants no more, or the time is over."""
+
+
+class Session:
+    """One report while it is made."""
+
+    def __init__(self, scene: Scene, seconds: float, watch: Watch | None, only: Callable[[Variant], bool] | None = None,
+                 size: int = 0) -> None:  # fmt: skip
+        if not seconds > 0.0:
+            raise ValueError(f"A report needs time: {seconds:g} seconds were given.")
+        self.scene, self.seconds, self._watch, self._only, self._size = scene, seconds, watch, only, size
+        self.start = time.perf_counter()
+        self.cancelled = False
+        self._doing = "pilot"
+        self._denoise_seconds = 0.0
+        self._wide_margin = WRITING_SECONDS if seconds > 10.0 * WRITING_SECONDS else WRITING_SHARE * seconds
+
+    # -- time -------------------------------------------------------------------------------------
+
+    @property
+    def spent(self) -> float:
+        return time.perf_counter() - self.start
+
+    @property
+    def left(self) -> float:
+        """For rendering."""
+        return self.seconds - self._wide_margin - self.spent
+
+    def _goes_on(self) -> bool:
+        if self.left <= 0.0:
+            return False
+        if self._watch is not None and not self._watch(
+            Told(self._doing, min(1.0, self.spent / self.seconds), self.spent, max(0.0, self.seconds - self.spent))
+        ):
+            self.cancelled = True
+        return not self.cancelled
+
+    def _shoot(self, doing: str, scene: Scene, seed: int, samples: int, *, denoised: bool = False,
+               goes_on: GoesOn | None = None) -> Shot:  # fmt: skip
+        self._doing = doing
+        shot = shoot(scene, seed, samples, goes_on or self._goes_on, denoised=denoised) if self._goes_on() else None
+        if shot is None:
+            raise Cancelled
+        return shot
+
+    # -- the story --------------------------------------------------------------------------------
+
+    def run(self) -> Report:
+        """Raises Cancelled where not even one way to render could be measured."""
+        self._fly_pilot()
+        self._render_reference()
+        self._found = [_Found(variant) for variant in self._variants]
+        rounds = 0
+        try:
+            while rounds < MOST_ROUNDS:
+                self._render_round(rounds)
+                rounds += 1
+        except Cancelled:
+            pass
+        return self._results()
+
+    def _fly_pilot(self) -> None:
+        """How fast it goes, and what follows: size, samples, which variants fit."""
+        small = scaled(self.scene, PILOT_SIZE)
+        samples = PILOT_SAMPLES
+        shot = self._shoot("pilot", small, FIRST_SEED, samples)
+        if shot.trace_seconds < min(PILOT_SECONDS, 0.02 * self.seconds):  # too short to tell; and now it is warm
+            samples *= PILOT_GROWTH
+            shot = self._shoot("pilot", small, FIRST_SEED, samples)
+        stats = shot.stats
+        self._warnings = list(stats.get("warnings", []))
+        self._device = stats["device"]
+        self._plan: Plan = plan(self.scene, effects_of(self.scene), stats.get("accelerator", ""),
+                                int(stats.get("triangles", 0)))  # fmt: skip
+        self._variants = [v for v in self._plan.variants if self._only is None or self._only(v)]
+        pace = shot.trace_seconds / (film_pixels(small.film) * samples)  # a path
+        self._unmeasured: list[str] = []
+        if self.seconds < LEAST_SECONDS_TO_FILTER:
+            self._leave_out(lambda variant: variant.denoised)
+        self._filters = any(variant.denoised for variant in self._variants)
+        if self._filters:
+            self._doing = "denoising, for the time"
+            width, height = size_of(self.scene.film)
+            self._denoise_seconds = denoise.seconds_for(width * height)
+        if self.left <= 0.0:
+            raise Cancelled
+        self._choose_size(pace, shot.build_seconds)
+        self._drop_what_does_not_fit(pace, shot.build_seconds)
+
+    def _choose_size(self, pace: float, build: float) -> None:
+        """The picture grows with the time; samples grow when it is large enough."""
+        width, height = size_of(self.scene.film)
+        renders = GOOD_ROUNDS * len(self._variants) * (1.0 + 1.0 / ANCHOR_EVERY)
+        tracing = max(0.05 * self.left, (1.0 - REFERENCE_SHARE) * self.left - renders * build)
+        paths = tracing / (renders * AVERAGE_COST * pace)
+        samples = 16 if paths > 16 * LEAST_SIZE**2 else LEAST_SAMPLES
+        longest = self._size or math.sqrt(paths / samples * max(width, height) / min(width, height))
+        longest = int(min(max(longest, LEAST_SIZE), max(MOST_SIZE, self._size), max(width, height)))
+        self._small = scaled(self.scene, longest)
+        pixels = film_pixels(self._small.film)
+        while samples < MOST_SAMPLES and 2 * samples * pixels < paths:
+            samples *= 2
+        self._samples = samples
+
+    def _drop_what_does_not_fit(self, pace: float, build: float) -> None:
+        each = build + AVERAGE_COST * pace * film_pixels(self._small.film) * self._samples
+        fits = int((1.0 - REFERENCE_SHARE) * self.left / (LEAST_ROUNDS * each * (1.0 + 1.0 / ANCHOR_EVERY)))
+        kept = [variant.name for variant in self._variants[: max(2, fits)]]
+        self._leave_out(lambda variant: variant.name not in kept)
+
+    def _leave_out(self, which: Callable[[Variant], bool]) -> None:
+        """For want of time."""
+        self._unmeasured += [variant.name for variant in self._variants if which(variant)]
+        self._variants = [variant for variant in self._variants if not which(variant)]
+
+    def _render_reference(self) -> None:
+        """Two halves, whose difference says how far it is converged itself."""
+        exact = replace(self._plan.variants[0], denoised=self._filters).of(self._small)
+        until = self.spent + REFERENCE_SHARE * self.left
+        first = self._shoot("reference", exact, REFERENCE_SEEDS[0], self._samples)
+        each = max(first.trace_seconds / self._samples, 1e-6)
+        wanted = (until - self.spent - 2.0 * first.build_seconds) / (2.0 * each)
+        done = max(2 * self._samples, 1 << int(math.log2(max(2.0, wanted))))
+        shots = [self._shoot("reference", exact, seed, done, denoised=self._filters) for seed in REFERENCE_SEEDS]
+        halves = [shot.last.astype(np.float64) for shot in shots]
+        self._truth = 0.5 * (halves[0] + halves[1])
+        self._weight = weights(self._truth)
+        self._truth_relmse = float(np.mean((0.5 * (halves[0] - halves[1])) ** 2 * self._weight))
+        self._reference_samples = 2 * done
+        self._filtered_errors: dict[int, float] = {}
+        for samples in shots[0].filtered:
+            # Each against the other half, which has twice the noise of both together.
+            found = [relative_error(shots[k].filtered[samples], halves[1 - k], self._weight)
+                     for k in (0, 1) if samples in shots[k].filtered]  # fmt: skip
+            self._filtered_errors[samples] = float(np.mean(found)) - 2.0 * self._truth_relmse
+
+    def _render_round(self, number: int) -> None:
+        """Every variant with one seed; the scene as it is set again between them, for the time alone."""
+        seed = FIRST_SEED + 1 + number
+        base_scene = self._plan.base.of(self._small)
+        pictures: dict[str, Any] = {}
+        anchor, since = 0.0, 0
+        waiting: list[tuple[_Found, float]] = []
+        half = 0.5 * self.left
+        for found in list(self._found):
+            if number == 0 and found is not self._found[0] and self.left < half:  # slower than the pilot foretold
+                rest = self._found[self._found.index(found) :]
+                self._unmeasured = [*(late.variant.name for late in rest), *self._unmeasured]
+                self._found = self._found[: -len(rest)]
+                break
+            variant = found.variant
+            name = f"round {number + 1}: {variant.name}"
+            shot = self._shoot(name, variant.of(self._small), seed, self._samples, denoised=variant.denoised)
+            if variant.name in (EXACT, AS_SET):
+                pictures[variant.name] = shot.last
+            self._keep(found, shot, pictures)
+            cost = self._cost(shot)
+            if variant.name == self._plan.base.name:
+                anchor, since = cost, 0
+                for earlier, spent in waiting:
+                    earlier.ratios.append(spent / anchor)
+                waiting = []
+                continue
+            waiting.append((found, cost))
+            since += 1
+            if anchor and since >= ANCHOR_EVERY:
+                anchor, since, waiting = self._close(base_scene, seed, anchor, waiting), 0, []
+        if anchor and waiting:
+            self._close(base_scene, seed, anchor, waiting)
+
+    def _close(self, scene: Scene, seed: int, before: float, waiting: list[tuple[_Found, float]]) -> float:
+        """One more render of the scene as it is set; those since the last are held against both."""
+        after = self._cost(self._shoot("as set, for the time", scene, seed, self._samples))
+        for place, (found, cost) in enumerate(waiting, 1):
+            share = place / (len(waiting) + 1)
+            found.ratios.append(cost / ((1.0 - share) * before + share * after))
+        return after
+
+    def _cost(self, shot: Shot) -> float:
+        """What tracing took: the processors' time where they did it, which other jobs on the machine do not change."""
+        return shot.trace_cpu_seconds if self._device == "CPU" else shot.trace_seconds
+
+    def _keep(self, found: _Found, shot: Shot, pictures: dict[str, Any]) -> None:
+        found.build.append(shot.build_seconds)
+        found.trace.append(shot.trace_seconds)
+        pictures_kept = shot.filtered if found.variant.denoised else shot.pictures
+        for samples, picture in pictures_kept.items():
+            found.tallies.setdefault(samples, Tally()).add(picture)
+            relmse = relative_error(picture, self._truth, self._weight) - self._truth_relmse
+            found.errors.setdefault(samples, []).append(relmse)
+        against = pictures.get(found.variant.against, pictures.get(EXACT))
+        last = pictures_kept[max(pictures_kept)]
+        found.differences.add(last - (against if against is not None else last))
+
+    # -- results ----------------------------------------------------------------------------------
+
+    def _results(self) -> Report:
+        measured = [f for f in self._found if f.differences.count >= LEAST_ROUNDS]
+        if not measured or measured[0].variant.name != EXACT:
+            raise Cancelled
+        base = next((f for f in measured if f.variant.name == self._plan.base.name), measured[0])
+        width, height = size_of(self._small.film)
+        full_width, full_height = size_of(self.scene.film)
+        left_out = [f.variant.name for f in self._found if f not in measured]
+        return Report(
+            scene=self.scene.name, width=width, height=height, full_width=full_width, full_height=full_height,
+            scene_samples=self.scene.settings.samples, device=self._device, seconds_asked=self.seconds,
+            seconds=self.spent, reference_samples=self._reference_samples,
+            reference_error=math.sqrt(self._truth_relmse), rows=[self._row(f, base) for f in measured],
+            base=base.variant.name, absent=self._plan.absent, unmeasured=[*left_out, *self._unmeasured],
+            warnings=self._warnings, cancelled=self.cancelled,
+        )  # fmt: skip
+
+    def _row(self, found: _Found, base: _Found) -> Row:
+        variant = found.variant
+        cost, low, high = _ratio(found.ratios) if found is not base else (1.0, 1.0, 1.0)
+        noise = {n: noise_of(t, self._weight) for n, t in sorted(found.tallies.items()) if t.count >= LEAST_ROUNDS}
+        line = fit_noise(list(noise.items()))
+        # What chooses paths otherwise has no bias of its own, but where light is clamped, noise decides what is cut.
+        own = base if not variant.biased and not floor_of(base.differences, self._weight).sure else found
+        floor = floor_of(own.differences, self._weight)
+        errors = {n: float(np.mean(found.errors[n])) for n in noise}
+        if variant.denoised:
+            errors = {**self._filtered_errors, **errors}
+            line = fit_errors(sorted(errors.items()))
+        build = float(np.median(found.build))
+        sample_seconds = cost * float(np.median(base.trace)) / self._samples
+        bright, bright_spread = brightness_of(own.differences, self._truth)
+        points = [
+            Point(n, build + n * sample_seconds, math.sqrt(max(0.0, errors[n])), noise[n].error if n in noise else 0.0)
+            for n in sorted(errors)
+        ]
+        return Row(
+            name=variant.name, group=variant.group, reason=variant.reason, biased=variant.biased,
+            effect=variant.effect, settings=dict(variant.settings), renders=found.differences.count,
+            samples=self._samples, build_seconds=build, sample_seconds=sample_seconds, cost=cost, cost_low=low,
+            cost_high=high, points=points, line=line, floor=floor, brightness=bright,
+            brightness_spread=bright_spread, denoised=variant.denoised,
+            denoise_seconds=self._denoise_seconds if variant.denoised else 0.0,
+        )  # fmt: skip
+
+    def pictures(self) -> dict[str, Any]:
+        """To look at: the reference, and the mean of each variant's renders, float64 (H, W, 3), bottom row first."""
+        shown = {"reference": self._truth}
+        for found in self._found:
+            if found.differences.count >= LEAST_ROUNDS:
+                shown[found.variant.name] = found.tallies[self._samples].mean
+        return shown
+
+
+def _ratio(ratios: list[float]) -> tuple[float, float, float]:
+    """Median of ratios with a 95 % interval from their spread."""
+    logs = np.log(ratios)
+    middle = float(np.median(logs))
+    if len(logs) < 2:
+        return math.exp(middle), 0.0, math.inf
+    # Few renders tell their own spread badly: Student's distribution, to second order as luch.accuracy has it.
+    few = 1.0 / (len(logs) - 1)
+    student = NORMAL_95 + (NORMAL_95**3 + NORMAL_95) / 4.0 * few
+    half = student * float(np.std(logs, ddof=1)) / math.sqrt(len(logs))
+    return math.exp(middle), math.exp(middle - half), math.exp(middle + half)
+
+
+__all__ = ["Cancelled", "Measured", "Session", "Told", "Watch"]
