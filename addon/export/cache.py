@@ -1,4 +1,4 @@
-"""Meshes and point clouds kept from frame to frame (Render Properties > Performance > Persistent Data)."""
+"""Meshes, point clouds and hair curves kept from frame to frame (Render Properties > Performance > Persistent Data)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 from luch.scene import Mesh
 
 from .context import ExportContext
+from .curves import export_curves
 from .meshes import export_mesh
 from .points import export_points
 
@@ -56,6 +57,8 @@ class MeshCache:
             wanted = wanted | (entry.wanted if entry else set())
             if subject.type == "POINTCLOUD":
                 mesh = export_points(data, wanted, context)
+            elif subject.type == "CURVES":
+                mesh = export_curves(data, wanted, context)
             else:
                 mesh = export_mesh(data, wanted, _undeformed(subject, data), context)
             self.read_count += 1

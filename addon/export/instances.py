@@ -14,6 +14,7 @@ from .derived import object_attributes
 from .lights import export_light
 from .materials import MaterialTable
 from .motion import MotionRecorder
+from .particles import export_hair, hair_systems
 from .visibility import instance_visibility
 from .volumes import warn_about_smoke
 
@@ -21,7 +22,6 @@ from .volumes import warn_about_smoke
 LISTED_AGAIN_AS_MESH = frozenset({"CURVE", "SURFACE", "FONT", "META"})
 NOTHING_TO_DRAW = frozenset({"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "GREASEPENCIL"})
 NOT_SUPPORTED = {  # type -> what it is, the effect that is missing
-    "CURVES": ("hair curves", "hair"),
     "VOLUME": ("a volume of grids", "heterogeneous volumes"),
 }
 NO_OBJECT = -1
@@ -40,6 +40,8 @@ def export_instances(
     for item in context.depsgraph.object_instances:
         if item.show_self:
             collector.add(item)
+        if item.show_particles:
+            collector.add_hair(item)
     collector.finish()
     return collector
 
@@ -55,6 +57,7 @@ class InstanceCollector:
         self._materials = MaterialTable(context)
         self._objects: dict[tuple[int, int, int], int] = {}
         self._mesh_indices: dict[int, int] = {}
+        self._hair: dict[tuple[int, int, int], list[int]] = {}
         self._object_column: list[int] = []
         self._matrices: list[bytes] = []  # 16 float32 each, rows
         self._random: list[int] = []
@@ -69,7 +72,7 @@ class InstanceCollector:
         if kind == "MESH":
             if self._solid:
                 self._add_mesh(item, subject)
-        elif kind == "POINTCLOUD":  # whatever View Layer > Filter > Surfaces says, as in Cycles
+        elif kind in ("POINTCLOUD", "CURVES"):  # whatever View Layer > Filter > Surfaces says, as in Cycles
             self._add_mesh(item, subject)
         elif kind == "LIGHT":
             self._add_light(item, subject)
@@ -95,12 +98,6 @@ class InstanceCollector:
             self._context.warn(
                 f'Object "{subject.name}" uses light linking; Luch lights everything by every light.', "light linking"
             )
-        # Particle hair hides in its object's modifiers.
-        if any(
-            system.settings.type == "HAIR" and system.settings.render_type == "PATH"
-            for system in subject.particle_systems
-        ):
-            self._context.warn(f'Object "{subject.name}" has particle hair, which Luch does not draw yet.', "hair")
 
     def finish(self) -> None:
         """Turn the columns into arrays."""
@@ -130,11 +127,28 @@ class InstanceCollector:
         index = self._objects.get(key)
         if index is None:
             index = self._objects[key] = self._add_object(subject, parent)
+        self._add_row(item, subject, parent, index)
+
+    def add_hair(self, item: Any) -> None:
+        """Particle hair of an instance: an object of its own for each system."""
+        subject = item.object
+        if subject.type != "MESH" or not (systems := hair_systems(subject)):
+            return
+        parent = item.parent if item.is_instance else subject
+        source = item.instance_object if item.is_instance else subject
+        key = (subject.data.as_pointer(), source.as_pointer(), parent.as_pointer())
+        if key not in self._hair:
+            self._hair[key] = [self._add_object(subject, parent, system) for system in systems]
+        for index in self._hair[key]:
+            self._add_row(item, subject, parent, index)
+
+    def _add_row(self, item: Any, subject: Any, parent: Any, index: int) -> None:
         if index == NO_OBJECT:
             return
         if self._recorder is not None:
             mesh = self._context.result.objects[index].mesh
             self._recorder.note(item, subject, parent, len(self._object_column), mesh)
+        is_instance = item.is_instance
         self._object_column.append(index)
         # Vectors of the iterator point into it: only copies may be kept.
         self._matrices.append(bytes(item.matrix_world))
@@ -147,17 +161,19 @@ class InstanceCollector:
             self._generated.extend(NO_INSTANCER_GENERATED)
             self._uv.extend(NO_INSTANCER_UV)
 
-    def _add_object(self, subject: Any, parent: Any) -> int:
+    def _add_object(self, subject: Any, parent: Any, hair: tuple[Any, Any] | None = None) -> int:
         visibility, holdout = instance_visibility(subject, parent, self._view_layer())
         if visibility == 0:
             return NO_OBJECT
         slots = self._materials.slots(subject, subject.data)
-        mesh = self._mesh_index(subject, parent, slots)
+        mesh = self._hair_index(subject, hair, slots) if hair else self._mesh_index(subject, parent, slots)
         if mesh == NO_OBJECT:
             return NO_OBJECT
         result = self._context.result
         # A face that names a slot beyond the last shows the last.
-        missing = int(result.meshes[mesh].material_slots.max(initial=0)) + 1 - len(slots)
+        drawn = result.meshes[mesh]
+        used = drawn.material_slots if drawn.curves is None else drawn.curves.material_slots
+        missing = int(used.max(initial=0)) + 1 - len(slots)
         slots += [slots[-1]] * max(0, missing)
         result.objects.append(
             Object(
@@ -177,6 +193,13 @@ class InstanceCollector:
         )
         self._warn_about_what_is_missing(subject)
         return len(result.objects) - 1
+
+    def _hair_index(self, subject: Any, hair: tuple[Any, Any], slots: list[int]) -> int:
+        mesh = export_hair(subject, *hair, self._materials.attributes(slots), self._context)
+        if mesh is None:
+            return NO_OBJECT
+        self._context.result.meshes.append(mesh)
+        return len(self._context.result.meshes) - 1
 
     def _view_layer(self) -> Any:
         """The original view layer: what collection flags are asked of."""

@@ -97,7 +97,9 @@ class MotionRecorder:
         scene = context.scene
         self._frame: float = scene.frame_current + scene.frame_subframe
         self._middle = self._frame + MIDDLE[shutter.position] * shutter.length
-        self._rows: dict[tuple[Any, ...], int] = {}  # instance -> row of the exporter's columns
+        self._rows: dict[
+            tuple[Any, ...], list[int]
+        ] = {}  # instance -> rows of the exporter's columns: itself, its hair
         self._keys: list[int] = []  # by row
         self._mesh_of: list[int] = []  # by row, index into Scene.meshes
         self._shapes: dict[int, _Shape] = {}  # by index into Scene.meshes
@@ -107,7 +109,7 @@ class MotionRecorder:
     def note(self, item: Any, subject: Any, parent: Any, row: int, mesh: int) -> None:
         """An instance that was exported. row: its place among all; mesh: index into Scene.meshes."""
         keys = motion_keys(subject, parent)
-        self._rows[_identity(item)] = row
+        self._rows.setdefault(_identity(item), []).append(row)
         self._keys.append(keys)
         self._mesh_of.append(mesh)
         if not keys:
@@ -178,18 +180,16 @@ class MotionRecorder:
     def _look(self, time: float) -> None:
         read: set[int] = set()
         for item in self._context.depsgraph.object_instances:
-            if not item.show_self or item.object.type not in ("MESH", "POINTCLOUD"):
+            if item.object.type not in ("MESH", "POINTCLOUD", "CURVES"):
                 continue
-            row = self._rows.get(_identity(item))
-            if row is None:
-                continue
-            if self._keys[row] and time in _times(self._keys[row]):
-                self._matrices.setdefault(row, {})[time] = bytes(item.matrix_world)
-            mesh = self._mesh_of[row]
-            shape = self._shapes.get(mesh)
-            if shape is not None and mesh not in read and time in _times(shape.keys) and time not in shape.positions:
-                read.add(mesh)
-                self._read_shape(mesh, shape, item.object.data, time)
+            for row in self._rows.get(_identity(item), ()):
+                if self._keys[row] and time in _times(self._keys[row]):
+                    self._matrices.setdefault(row, {})[time] = bytes(item.matrix_world)
+                mesh = self._mesh_of[row]
+                shape = self._shapes.get(mesh)
+                if shape and mesh not in read and time in _times(shape.keys) and time not in shape.positions:
+                    read.add(mesh)
+                    self._read_shape(mesh, shape, item.object.data, time)
 
     def _read_shape(self, mesh: int, shape: _Shape, data: Any, time: float) -> None:
         found = export_shape(data, shape.topology, self._context.result.meshes[mesh])

@@ -27,6 +27,9 @@ SAME_NAME = (
     "light_sampling_threshold",
 )
 
+# Cycles' names of what curves look like -> Settings.curve_shape.
+SHAPES = {"RIBBONS": "RIBBON", "THICK": "THICK", "THICK_LINEAR": "THICK_LINEAR"}
+
 
 def export_settings(context: ExportContext) -> Settings:
     """What trades accuracy for time."""
@@ -51,6 +54,10 @@ def export_settings(context: ExportContext) -> Settings:
         force_effects=["ALL"] if scene.luch.force_effects else [],
         **{name: effective(scene, name) for name in SAME_NAME},
     )
+    curves = getattr(scene, "cycles_curves", None)
+    if curves is not None:
+        settings.curve_shape = SHAPES.get(curves.shape, "RIBBON")
+        settings.curve_subdivisions = curves.subdivisions
     if context.view_layer.samples > 0:
         settings.samples = context.view_layer.samples
     if scene.world is not None:

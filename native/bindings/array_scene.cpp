@@ -20,7 +20,7 @@ ArrayScene::ArrayScene(const FloatArray& positions, const IndexArray& triangles,
         }
         if (flags.size() == 0) continue;
         mesh_flags.emplace_back(flags.data() + row[2], flags.data() + row[2] + row[3]);
-        mesh_flags.back().resize(primitive_count(meshes[m]));
+        mesh_flags.back().resize(first_piece(meshes[m]));
         const py::ssize_t first = triangles.shape(0) + py::ssize_t(meshes[m].first_sphere);
         if (flags.size() >= first + py::ssize_t(meshes[m].sphere_count))
             std::copy_n(flags.data() + first, meshes[m].sphere_count, mesh_flags.back().data() + row[3]);

@@ -8,6 +8,7 @@
 
 #include "bindings/bind.h"
 #include "luch/bsdf/setup.h"
+#include "luch/bsdf/setup_hair.h"
 
 namespace luch::bindings {
 namespace {
@@ -130,6 +131,36 @@ void set_up_principled(ClosureSet& set, Color weight, Inputs& in, const SetupCon
     setup_principled(set, weight, p, c);
 }
 
+void set_up_principled_hair(ClosureSet& set, Color w, Inputs& in, const SetupContext& c) {
+    PrincipledHairParams p;
+    bool melanin = false;
+    FibreSurface surface = {c.n, {1.0f, 0.0f, 0.0f}};
+    in.read("pigments", melanin);
+    in.read("melanin", p.melanin);
+    in.read("melanin_redness", p.melanin_redness);
+    in.read("absorption", p.absorption);
+    in.read("roughness", p.roughness);
+    in.read("radial_roughness", p.radial_roughness);
+    in.read("coat", p.coat);
+    in.read("ior", p.ior);
+    in.read("offset", p.offset);
+    in.read("tangent", surface.tangent);
+    p.parametrization = melanin ? HairColor::MELANIN : HairColor::ABSORPTION;
+    setup_principled_hair(set, w, p, surface, c);
+}
+
+void set_up_hair(ClosureSet& set, Color w, Inputs& in, const SetupContext& c) {
+    bool transmission = false;
+    float offset = 0.0f, along = 0.1f, around = 1.0f;
+    Vec3 tangent = {1.0f, 0.0f, 0.0f};
+    in.read("transmission", transmission);
+    in.read("offset", offset);
+    in.read("roughness_along", along);
+    in.read("roughness_around", around);
+    in.read("tangent", tangent);
+    setup_hair(set, w, transmission, offset, along, around, tangent, c);
+}
+
 const std::map<std::string, Setup>& setups() {
     using Set = ClosureSet&;
     using Context = const SetupContext&;
@@ -211,6 +242,8 @@ const std::map<std::string, Setup>& setups() {
              setup_refraction(set, w, p, c);
          }},
         {"principled", set_up_principled},
+        {"principled_hair", set_up_principled_hair},
+        {"hair", set_up_hair},
     };
     return table;
 }

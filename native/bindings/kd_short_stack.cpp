@@ -17,7 +17,7 @@ py::tuple closest_with_short_stack(const IndexArray& nodes, const IndexArray& re
     const float* b = box.data();
     KdTree tree = {
         reinterpret_cast<const KdNode*>(nodes.data()), refs.data(), {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}}};
-    Primitives all = {corners.data(), nullptr, nullptr, u32(corners.shape(0)), 0};
+    Primitives all = {corners.data(), nullptr, nullptr, u32(corners.shape(0)), 0, {}};
     FloatArray out({rays.shape(0), py::ssize_t(3)});
     IndexArray found(rays.shape(0));
     const Ray* ray = reinterpret_cast<const Ray*>(rays.data());

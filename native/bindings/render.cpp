@@ -81,6 +81,7 @@ class PyRenderer {
         facts["subsurface"] = scene.has_subsurface;
         facts["media"] = scene.has_media;
         facts["materials"] = scene.view.material_count;
+        facts["curves"] = renderer_->trees().stats().pieces > 0;
         facts["structure"] = cpu::accel_name({false, renderer_->trees().kind()});
         bool emission_programs = false, lamp_programs = false;
         for (u32 m = 0; m < scene.view.material_count; ++m)
@@ -113,10 +114,12 @@ class PyRenderer {
         d["accelerator_reason"] = s.accel_reason;
         d["triangles"] = s.accel.triangles;
         d["spheres"] = s.accel.spheres;
+        d["curve_pieces"] = s.accel.pieces;
         d["structure_nodes"] = s.accel.nodes;
         d["structure_bytes"] = s.accel.bytes;
         d["dropped_triangles"] = s.accel.dropped_triangles;
         d["dropped_spheres"] = s.accel.dropped_spheres;
+        d["dropped_curve_pieces"] = s.accel.dropped_pieces;
         d["dropped_instances"] = dropped_instances_;
         d["structure_seconds"] = s.accel_seconds;
         d["lights_seconds"] = s.lights_seconds;

@@ -46,6 +46,8 @@ Domain read_domain(const std::string& name, const std::string& mesh) {
     if (name == "FACE") return Domain::FACE;
     if (name == "MESH") return Domain::MESH;
     if (name == "SPHERE") return Domain::SPHERE;
+    if (name == "CURVE") return Domain::CURVE;
+    if (name == "CURVE_POINT") return Domain::CURVE_POINT;
     if (name == "NONE") return Domain::NONE_;
     throw std::invalid_argument("Mesh \"" + mesh + "\": the domain \"" + name + "\" of an attribute is not known.");
 }
@@ -103,6 +105,18 @@ struct Reader {
         return store.add_program(source);
     }
 
+    static cpu::CurveInput read_curves(const std::string& name, const py::object& curves, Keep& keep) {
+        auto points = keep.array<float>(curves.attr("points"));
+        auto first = keep.array<u32>(curves.attr("first"));
+        auto slots = keep.array<u16>(curves.attr("material_slots"));
+        if (points.ndim() != 2 || points.shape(1) != 4 || first.ndim() != 1 || slots.ndim() != 1 ||
+            slots.shape(0) != first.shape(0))
+            throw std::invalid_argument("Mesh \"" + name +
+                                        "\": curves need points (P, 4), place and radius, first (C,) " +
+                                        "and material_slots (C,).");
+        return {points.data(), size_t(points.shape(0)), first.data(), slots.data(), size_t(first.shape(0))};
+    }
+
     void read_mesh(const py::object& mesh) {
         Keep keep;
         cpu::MeshInput in{};
@@ -127,6 +141,7 @@ struct Reader {
             in.spheres = spheres.data();
             in.sphere_count = size_t(spheres.shape(0));
         }
+        if (!mesh.attr("curves").is_none()) in.curves = read_curves(in.name, mesh.attr("curves"), keep);
         if (!mesh.attr("normals").is_none()) {
             auto normals = keep.array<float>(mesh.attr("normals"));
             in.normals_domain = read_domain(py::cast<std::string>(mesh.attr("normals_domain")), in.name);
@@ -492,6 +507,18 @@ struct Reader {
         input.limits.alpha_threshold = py::cast<float>(film.attr("alpha_threshold"));
     }
 
+    void read_curve_settings(const py::object& settings) {
+        constexpr std::pair<const char*, CurveShape> SHAPES[] = {
+            {"RIBBON", CurveShape::RIBBON}, {"THICK", CurveShape::THICK}, {"THICK_LINEAR", CurveShape::THICK_LINEAR}};
+        auto name = py::cast<std::string>(settings.attr("curve_shape"));
+        auto found = std::find_if(std::begin(SHAPES), std::end(SHAPES), [&](auto& s) { return name == s.first; });
+        if (found == std::end(SHAPES))
+            throw std::invalid_argument("Curve shape \"" + name +
+                                        "\" is not known; take RIBBON, THICK or THICK_LINEAR.");
+        store.view().curve_shape = found->second;
+        store.view().log2_pieces = log2_pieces_of(found->second, py::cast<u32>(settings.attr("curve_subdivisions")));
+    }
+
     void read_settings(const py::object& settings) {
         auto count = [&](const char* name) { return py::cast<u32>(settings.attr(name)); };
         auto number = [&](const char* name) { return py::cast<float>(settings.attr(name)); };
@@ -512,6 +539,7 @@ struct Reader {
         limits.caustics_refractive = py::cast<bool>(settings.attr("caustics_refractive"));
         limits.ao_distance = number("ao_distance");
         input.light_tree = py::cast<bool>(settings.attr("light_tree"));
+        read_curve_settings(settings);
         input.seed = count("seed");
         input.samples = count("samples");
         input.first_sample = count("first_sample");

@@ -40,8 +40,8 @@ class ArrayStructure {
             if (sphere_can_be_traced({vec3_of(s + 4 * size_t(k)), s[4 * size_t(k) + 3]}))
                 refs_.push_back(triangle_count + k);
         dropped_ = triangle_count + sphere_count - refs_.size();
-        Primitives all = {corners_.data(), spheres_.data(), flags_.empty() ? nullptr : flags_.data(), triangle_count,
-                          sphere_count};
+        Primitives all = {corners_.data(), spheres_.data(), flags_.empty() ? nullptr : flags_.data(),
+                          triangle_count,  sphere_count,    {}};
         structure_ = cpu::build_structure(cpu::StructureKind(kind),
                                           {all, refs_.data(), u32(refs_.size()), cpu::BuildQuality(quality)}, pool_);
     }

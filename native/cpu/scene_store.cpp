@@ -27,6 +27,10 @@ size_t rows_of(Domain domain, const MeshInput& mesh) {
             return 1;
         case Domain::SPHERE:
             return mesh.sphere_count;
+        case Domain::CURVE:
+            return mesh.curves.curve_count;
+        case Domain::CURVE_POINT:
+            return mesh.curves.point_count;
         case Domain::NONE_:
             return 0;
     }
@@ -139,6 +143,7 @@ void SceneStore::add_mesh(const MeshInput& input) {
     mesh.triangle_count = u32(input.triangle_count);
     mesh.first_sphere = u32(spheres_.size() / 4);
     mesh.sphere_count = u32(input.sphere_count);
+    if (input.curves.curve_count > 0) curves_.add(input.name, input.curves, mesh);
     mesh.first_normal = u32(normals_.size() / 3);
     mesh.normals_domain = input.normals ? input.normals_domain : Domain::NONE_;
     mesh.texture_location = input.texture_location;
@@ -253,6 +258,7 @@ const SceneView& SceneStore::finish() {
     view_.triangles = triangles_.data();
     view_.material_slots = material_slots_.data();
     view_.spheres = spheres_.data();
+    curves_.point(view_);
     view_.normals = normals_.data();
     view_.attribute_data = attribute_data_.data();
     view_.attributes = attributes_.data();
@@ -285,8 +291,12 @@ std::vector<std::vector<u8>> SceneStore::transparency_flags(bool all) const {
         if (!any) continue;
         const MeshView& mesh = meshes_[object.mesh];
         std::vector<u8>& out = flags[object.mesh];
-        out.resize(primitive_count(mesh));
-        for (u32 s = mesh.triangle_count; s < out.size(); s++) out[s] |= transparent[0];
+        out.resize(primitive_count(view_, mesh));
+        for (u32 s = mesh.triangle_count; s < first_piece(mesh); s++) out[s] |= transparent[0];
+        for (u32 p = first_piece(mesh); p < out.size(); p++) {
+            u16 slot = curves_.slot_of_segment(mesh, segment_of_prim(view_, mesh, p));
+            out[p] |= transparent[slot < transparent.size() ? slot : transparent.size() - 1];
+        }
         for (u32 t = 0; t < mesh.triangle_count; t++) {
             u16 slot = material_slots_[mesh.first_triangle + t];
             out[t] |= transparent[slot < transparent.size() ? slot : transparent.size() - 1];
@@ -299,6 +309,7 @@ void SceneStore::describe(DeviceImage& image, u32 block, const SceneView& view) 
     image.add_array("positions", block, view.positions, positions_.size());
     image.add_array("triangles", block, view.triangles, triangles_.size());
     image.add_array("spheres", block, view.spheres, spheres_.size());
+    curves_.describe(image, block, view);
     image.add_array("material_slots", block, view.material_slots, material_slots_.size());
     image.add_array("normals", block, view.normals, normals_.size());
     image.add_array("attribute_data", block, view.attribute_data, attribute_data_.size());
@@ -320,7 +331,7 @@ void SceneStore::describe(DeviceImage& image, u32 block, const SceneView& view) 
 size_t SceneStore::bytes() const {
     size_t sum =
         (positions_.size() + spheres_.size() + normals_.size() + attribute_data_.size() + triangles_.size()) * 4 +
-        material_slots_.size() * 2 + instances_.size() * sizeof(InstanceView);
+        material_slots_.size() * 2 + instances_.size() * sizeof(InstanceView) + curves_.bytes();
     for (const std::vector<u8>& pixels : pixels_) sum += pixels.size();
     sum += motion_.bytes();
     return sum;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "cpu/curve_store.h"
 #include "cpu/device_image.h"
 #include "cpu/motion/motion_store.h"
 #include "cpu/shade/link.h"
@@ -30,6 +31,7 @@ struct MeshInput {
     size_t triangle_count;
     const float* spheres;  // centre and radius, four each
     size_t sphere_count;
+    CurveInput curves;
     const float* normals;  // null: flat
     Domain normals_domain;
     std::vector<AttributeInput> attributes;
@@ -103,6 +105,7 @@ class SceneStore {
     SceneView view_{};
     LinkedPrograms programs_;
     MotionStore motion_;
+    CurveStore curves_;
     std::vector<float> positions_, spheres_, normals_, attribute_data_;
     std::vector<u32> triangles_, material_table_;
     std::vector<u16> material_slots_;

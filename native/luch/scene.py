@@ -27,12 +27,23 @@ class Attribute:
     """A named value on a mesh: float32 (n, channels 1..4), one row per element of its domain."""
 
     data: F32
-    domain: str  # "POINT" (V rows), "CORNER" (3T rows), "FACE" (T rows), "MESH" (1 row), "SPHERE" (S rows)
+    domain: str  # "POINT" (V rows), "CORNER" (3T rows), "FACE" (T rows), "MESH" (1 row), "SPHERE" (S rows);
+    # of curves "CURVE" (C rows) and "CURVE_POINT" (P rows, mixed between neighbours)
+
+
+@dataclass
+class Curves:
+    """Hair: Catmull-Rom curves through points; Settings.curve_shape says what they look like."""
+
+    points: F32  # (P, 4) place and radius in object space
+    first: U32  # (C,) first point of each curve, ascending from 0; it ends where the next begins. One point: not drawn
+    material_slots: NDArray[np.uint16]  # (C,)
 
 
 @dataclass
 class Mesh:
-    """Triangles and spheres in object space. Sphere k is primitive T + k; all spheres show the first material."""
+    """Triangles, spheres and curves in object space. Sphere k is primitive T + k and shows the first material; the pieces
+    of curves' segments follow."""
 
     name: str
     positions: F32  # (V, 3)
@@ -49,6 +60,7 @@ class Mesh:
     texture_size: tuple[float, float, float] = (1.0, 1.0, 1.0)
     # (S, 4) centre and radius, as point clouds have them: only their outside is seen. A radius of 0 is not drawn.
     spheres: F32 | None = None
+    curves: Curves | None = None
     # Its shape while the shutter is open, at evenly spaced times; None: it keeps it. The fields above are those of the
     # shutter's middle.
     motion_positions: F32 | None = None  # (K, V, 3)
@@ -288,6 +300,8 @@ class Settings:
     light_sampling_threshold: float = 0.01
     accelerator: str = "AUTO"  # or a kind of luch.accel
     precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
+    curve_shape: str = "RIBBON"  # turned to each ray, shaded as if round; or "THICK" (round), "THICK_LINEAR" (cones)
+    curve_subdivisions: int = 2  # a ribbon is straight in 2**n pieces of a segment, n at most 4
     integrator: str = "PATH"
     device: str = "CPU"  # or "CUDA"
     texture_memory: float = 0.0  # MB of images on each GPU, 0: what fits; the rest is read from the host's memory

@@ -251,10 +251,10 @@ def test_a_transform_that_is_not_finite_leaves_the_object_out(scene: bpy.types.S
 
 
 def test_an_unsupported_object_is_named_once(scene: bpy.types.Scene) -> None:
-    hair = bpy.data.objects.new("Fur", bpy.data.hair_curves.new("Fur"))
-    scene.collection.objects.link(hair)
+    smoke = bpy.data.objects.new("Smoke", bpy.data.volumes.new("Smoke"))
+    scene.collection.objects.link(smoke)
     (warning,) = export().warnings
-    assert warning.startswith('Object "Fur" is hair curves')
+    assert warning.startswith('Object "Smoke" is a volume')
 
 
 def test_name_hash_is_the_one_that_object_info_shows() -> None:

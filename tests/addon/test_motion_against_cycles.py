@@ -211,3 +211,44 @@ def test_light_of_a_mesh_that_moves_is_that_of_cycles(stage: Any, render: Callab
     screen.location = (0.0, 0.0, -0.6)
     animate(screen, "rotation_euler", (0.0, 0.0, 0.0), (0.0, 0.0, 1.5))
     check(render, tolerance=0.015, samples=2 * SAMPLES)
+
+
+def fur(scene: Any) -> Any:
+    """Thick bent strands that show across what they lie."""
+    data = bpy.data.hair_curves.new("Fur")
+    data.add_curves([4, 3])
+    rows = np.array([(-1.2, -0.6, 0, 0.2), (-0.5, 0.1, 0.3, 0.2), (0.3, -0.4, 0.4, 0.15), (1.2, 0.2, 0.1, 0.1),
+                     (-0.9, 0.9, 0, 0.1), (0.2, 0.5, 0.5, 0.2), (0.9, 1.0, 0.2, 0.2)], np.float32)  # fmt: skip
+    data.attributes["position"].data.foreach_set("vector", rows[:, :3].ravel())
+    data.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", np.ascontiguousarray(rows[:, 3]))
+    subject = add(scene, data, (1.0, 1.0, 1.0))
+    across(data.materials[0])
+    return subject
+
+
+def across(material: Any) -> None:
+    """It shines in the colours of Curves Info's Tangent Normal."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    links.new(nodes.new("ShaderNodeHairInfo").outputs["Tangent Normal"], nodes["Emission"].inputs["Color"])
+
+
+def test_hair_curves_move_with_their_object_as_in_cycles(stage: Any, render: Callable[..., Any]) -> None:
+    subject = fur(stage)
+    stage.cycles_curves.subdivisions = 4  # see test_hair_against_cycles.py
+    animate(subject, "location", (-0.8, 0.0, 0.0), (0.8, 0.3, 0.2))
+    animate(subject, "rotation_euler", (0.2, 0.0, -0.7), (0.0, 0.3, 0.7))
+    check(render)
+
+
+def test_particle_hair_moves_with_its_emitter_as_in_cycles(stage: Any, render: Callable[..., Any]) -> None:
+    bpy.ops.mesh.primitive_plane_add(size=2.0)
+    emitter = bpy.context.object
+    emitter.data.materials.append(glowing("Fur", (1.0, 1.0, 1.0)))
+    across(emitter.data.materials[0])
+    emitter.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = emitter.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length, settings.radius_scale = "HAIR", 12, 1.5, 0.2
+    emitter.rotation_euler = (1.2, 0.0, 0.0)
+    emitter.show_instancer_for_render = False
+    animate(emitter, "location", (-0.8, -0.5, 0.0), (0.8, -0.2, 0.2))
+    check(render)

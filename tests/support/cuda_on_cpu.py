@@ -141,7 +141,7 @@ def _planned(text: str, defines: Sequence[str]) -> str:
 def _reached(source: Path, kernels: Path) -> str:
     """The source with the kernel files that it includes."""
     text = source.read_text(encoding="utf-8")
-    included = re.findall(r'#include "(\w+/\w+\.cuh)"', text)
+    included = re.findall(r'#include "(\w+/\w+\.cuh?)"', text)
     return text + "".join(_reached(kernels / name, kernels) for name in included)
 
 

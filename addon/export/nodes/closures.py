@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 from luch.shader import Value, Vector
 
+from ..curves import RANDOM
 from .tree import Compiler, closure_emitter
 
 _SUBSURFACE = {"RANDOM_WALK": 0, "RANDOM_WALK_SKIN": 1, "RANDOM_WALK_LEGACY": 2, "BURLEY": 3}  # SubsurfaceMethod, there
@@ -207,12 +208,46 @@ def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     c.builder.closure("CLOSURE_SUBSURFACE", weight, inputs, _params(c, _SUBSURFACE[node.falloff]))
 
 
-@closure_emitter("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled")
-def as_diffuse(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
-    """Hair: diffuse of the same colour."""
-    c.warn(node, "is not supported yet; it is shown as diffuse of its colour", "hair")
-    zero = c.builder.constant(0.0)
-    c.builder.closure("CLOSURE_DIFFUSE", weight, (*c.color(node, "Color"), zero, zero, zero, zero), _params(c))
+@closure_emitter("ShaderNodeBsdfHair")
+def hair(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Hair BSDF: reflection or transmission. Without a tangent of its own the curve's serves."""
+    tangent = c.vector(node, "Tangent") if c.is_linked(node, "Tangent") else c.builder.vector(0.0, 0.0, 0.0)
+    scalars = (c.float(node, "Offset"), c.float(node, "RoughnessU"), c.float(node, "RoughnessV"))
+    inputs = (*c.color(node, "Color"), *scalars, *tangent)
+    c.builder.closure("CLOSURE_HAIR", weight, inputs, _params(c, int(node.component == "Transmission")))
+
+
+# As HairColor of luch/bsdf/setup_hair.h.
+_HAIR_COLORS = {"ABSORPTION": 0, "MELANIN": 1, "COLOR": 2}
+
+
+@closure_emitter("ShaderNodeBsdfHairPrincipled")
+def principled_hair(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
+    """Principled Hair: the model of Chiang, in all three ways to give a colour."""
+    radial = c.float(node, "Radial Roughness")
+    if node.model == "HUANG":
+        c.warn(node, "uses the model Huang, which is not supported yet; it is shown by the model Chiang", "Huang hair")
+        radial = c.float(node, "Roughness")
+    random = (
+        c.float(node, "Random")
+        if c.is_linked(node, "Random")
+        else c.builder.op("ATTRIBUTE_VALUE", (), (0, 0, c.builder.attribute(RANDOM)))[3]
+    )
+
+    def scalars(*names: str) -> list[Value]:
+        return [c.float(node, name) for name in names]
+
+    inputs = [
+        *c.color(node, "Color"),
+        *scalars("Melanin", "Melanin Redness"),
+        *c.color(node, "Tint"),
+        *c.vector(node, "Absorption Coefficient"),
+        *scalars("Roughness"),
+        radial,
+        *scalars("Coat", "IOR", "Offset", "Random Color", "Random Roughness"),
+        random,
+    ]
+    c.builder.closure("CLOSURE_PRINCIPLED_HAIR", weight, inputs, _params(c, _HAIR_COLORS[node.parametrization]))
 
 
 @closure_emitter("ShaderNodeBsdfRayPortal")

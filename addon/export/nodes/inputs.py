@@ -10,8 +10,9 @@ from typing import Any
 
 import bpy
 import numpy as np
-from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_UV, Vector, float_word
+from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_UV, Value, Vector, float_word
 
+from ..curves import INTERCEPT, LENGTH, RANDOM
 from ..derived import ISLAND, POINTINESS, property_color
 from .tree import Compiler, Outputs, emitter
 
@@ -252,9 +253,27 @@ def point_info(c: Compiler, node: bpy.types.Node) -> Outputs:
     return {"Position": (x, y, z), "Radius": radius, "Random": random}
 
 
-@emitter("ShaderNodeHairInfo", "ShaderNodeParticleInfo", "ShaderNodeVolumeInfo")
+@emitter("ShaderNodeHairInfo")
+def curves_info(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Curves Info: of a hair; elsewhere zero."""
+    strand, thickness, *normal = c.builder.op("CURVES_INFO")
+
+    def told(name: str) -> Value:
+        return c.builder.op("ATTRIBUTE_VALUE", (), (0, 0, c.builder.attribute(name)))[3]
+
+    return {
+        "Is Strand": strand,
+        "Intercept": told(INTERCEPT),
+        "Length": told(LENGTH),
+        "Thickness": thickness,
+        "Tangent Normal": (normal[0], normal[1], normal[2]),
+        "Random": told(RANDOM),
+    }
+
+
+@emitter("ShaderNodeParticleInfo", "ShaderNodeVolumeInfo")
 def no_such_geometry(c: Compiler, node: bpy.types.Node) -> Outputs:
-    """Hair, Particle and Volume Info on a mesh: zero, as in Cycles."""
+    """Particle and Volume Info on a mesh: zero, as in Cycles."""
     return {
         socket.identifier: c.builder.vector(0.0, 0.0, 0.0)
         if socket.type in ("VECTOR", "RGBA")

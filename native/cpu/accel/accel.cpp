@@ -1,4 +1,4 @@
-// Two levels: groups of triangles or spheres, and entries that put a group into the world.
+// Two levels: groups of triangles, spheres or curves, and entries that put a group into the world.
 #include "cpu/accel/accel.h"
 
 #include <algorithm>
@@ -72,6 +72,7 @@ TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& f
     build_groups(plan, scene, flags, choice, pool);
     stats_.dropped_triangles = plan.dropped_triangles;
     stats_.dropped_spheres = plan.dropped_spheres;
+    stats_.dropped_pieces = plan.dropped_pieces;
     bool search_entries = choice.wide || choice.kind != StructureKind::BRUTE_FORCE;  // the oracle asks them all
     set_world_apart(plan);
     EntryBoxes boxes;
@@ -117,10 +118,13 @@ void TwoLevel::count() {
     for (const Group& group : groups_) {
         count_primitives(group, &stats_);
         stats_.nodes += group.nodes.size();
-        stats_.leaf_blocks += group.blocks.size() + group.sphere_blocks.size();
-        stats_.bytes += group.nodes.bytes() + group.blocks.bytes() + group.sphere_blocks.bytes();
+        stats_.leaf_blocks += group.blocks.size() + group.sphere_blocks.size() + group.curve_blocks.size();
+        stats_.bytes +=
+            group.nodes.bytes() + group.blocks.bytes() + group.sphere_blocks.bytes() + group.curve_blocks.bytes();
         stats_.bytes += group.members.size() * sizeof(Member) + group.flags.size();
-        stats_.bytes += (group.corners.size() + group.spheres.size()) * sizeof(float);
+        stats_.bytes +=
+            (group.corners.size() + group.spheres.size() + group.curve_points.size() + group.curve_segments.size()) *
+            sizeof(float);
         if (group.moving) {
             stats_.nodes += group.moving->nodes();
             stats_.bytes += group.moving->bytes();

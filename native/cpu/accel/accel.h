@@ -15,10 +15,12 @@ namespace luch::cpu {
 struct AccelStats {
     u64 triangles = 0;          // kept, counted once per mesh (once per instance where meshes are merged)
     u64 spheres = 0;            // kept, once per mesh
+    u64 pieces = 0;             // of curves: kept, once per mesh
     u64 nodes = 0, leaf_blocks = 0;
     u64 bytes = 0;              // nodes, leaf blocks and tables
     u64 dropped_triangles = 0;  // a vertex is not finite, its index lies outside the mesh, or there is no area
     u64 dropped_spheres = 0;    // not finite, or of no size
+    u64 dropped_pieces = 0;     // not finite, or of no radius
     double build_seconds = 0.0;
 };
 

@@ -171,12 +171,23 @@ LeafPrimitive leaf_primitive(const Primitives& all, u32 ref) {
     LeafPrimitive out = {};
     out.ref = ref;
     out.flags = all.flags ? all.flags[ref] : 0;
-    out.is_sphere = ref >= all.triangle_count;
-    const float* p = out.is_sphere ? all.spheres + 4 * u64(ref - all.triangle_count) : all.corners + 9 * u64(ref);
+    if (is_piece(all, ref)) {
+        Capsule c = piece_capsule(all.curves, piece_of(all, ref));
+        out.kind = LEAF_PIECE;
+        for (int k = 0; k < 3; ++k) {
+            out.a[k] = c.a[k];
+            out.b[k] = c.b[k];
+        }
+        out.c[0] = c.radius;
+        return out;
+    }
+    bool sphere = ref >= all.triangle_count;
+    out.kind = sphere ? LEAF_SPHERE : LEAF_TRIANGLE;
+    const float* p = sphere ? all.spheres + 4 * u64(ref - all.triangle_count) : all.corners + 9 * u64(ref);
     for (int k = 0; k < 3; ++k) {
         out.a[k] = p[k];
-        out.b[k] = out.is_sphere ? (k == 0 ? p[3] : 0.0f) : p[3 + k];
-        out.c[k] = out.is_sphere ? 0.0f : p[6 + k];
+        out.b[k] = sphere ? (k == 0 ? p[3] : 0.0f) : p[3 + k];
+        out.c[k] = sphere ? 0.0f : p[6 + k];
     }
     return out;
 }

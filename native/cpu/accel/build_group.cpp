@@ -14,9 +14,12 @@ namespace {
 
 constexpr size_t GATHER_CHUNK = 16384;  // primitives
 
-constexpr u32 TRIANGLES_A_BLOCK = 4, SPHERES_A_BLOCK = 8;
+constexpr u32 TRIANGLES_A_BLOCK = 4, SPHERES_A_BLOCK = 8, PIECES_A_BLOCK = 8;
 
-u32 leaf_width(const Group& group) { return group.of_spheres ? SPHERES_A_BLOCK : TRIANGLES_A_BLOCK; }
+u32 leaf_width(const Group& group) {
+    constexpr u32 width[] = {TRIANGLES_A_BLOCK, SPHERES_A_BLOCK, PIECES_A_BLOCK};
+    return width[size_t(group.kind)];
+}
 
 struct Corners3 {
     Vec3 p[3];
@@ -52,7 +55,12 @@ class Gather {
         return sphere_can_be_traced(*out);
     }
     bool read_box(u32 ref, const Member& member, Box* out) const {
-        if (group_.of_spheres) {
+        if (group_.kind == GroupKind::CURVES) {
+            if (!piece_can_be_traced(group_.curves, ref)) return false;
+            *out = capsule_box(piece_capsule(group_.curves, ref));
+            return true;
+        }
+        if (group_.kind == GroupKind::SPHERES) {
             Sphere s;
             if (!read(ref, member, &s)) return false;
             *out = sphere_box(s.center, s.radius);
@@ -75,6 +83,18 @@ class Gather {
     const SceneView& scene_;
     const std::vector<std::vector<u8>>& flags_;
 };
+
+// The mesh's curves: the scene may go away.
+void copy_curves(Group& group, const SceneView& scene) {
+    const MeshView& mesh = scene.meshes[group.members[0].mesh];
+    group.curves = curves_of(scene, mesh);
+    group.curve_segments.assign(group.curves.segments, group.curves.segments + mesh.segment_count);
+    u32 points = 0;
+    for (u32 word : group.curve_segments) points = std::max(points, (word >> 2) + 2u);
+    group.curve_points.assign(group.curves.points, group.curves.points + 4 * size_t(points));
+    group.curves.points = group.curve_points.data();
+    group.curves.segments = group.curve_segments.data();
+}
 
 // The boxes of the primitives kept, in order of ref.
 HugeArray<PrimBox> gather_boxes(const Group& group, const Gather& gather, ThreadPool& pool, size_t* kept) {
@@ -135,6 +155,20 @@ void fill_block(SphereBlock& block, const u32* refs, u32 count, const Group& gro
     }
 }
 
+void fill_block(CurveBlock& block, const u32* refs, u32 count, const Group& group, const Gather& gather) {
+    for (u32 lane = 0; lane < PIECES_A_BLOCK; ++lane) {
+        bool here = lane < count;
+        // An empty lane repeats the first capsule, and its ref says that it is empty.
+        Capsule c = piece_capsule(group.curves, refs[here ? lane : 0]);
+        for (int axis = 0; axis < 3; ++axis) {
+            block.a[axis][lane] = c.a[axis];
+            block.b[axis][lane] = c.b[axis];
+        }
+        block.radius[lane] = here ? c.radius : 0.0f;
+        block.ref[lane] = here ? gather.flagged(refs[lane], group.members[0]) : REF_MASK;
+    }
+}
+
 // Turns the builder's leaves (ranges of order) into blocks.
 void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gather, ThreadPool& pool) {
     const u32 width = leaf_width(group);
@@ -163,7 +197,9 @@ void make_blocks(Group& group, const std::vector<u32>& order, const Gather& gath
             for (size_t b = begin; b < end; ++b) fill_block(blocks[b], &order[first_order[b]], size[b], group, gather);
         });
     };
-    if (group.of_spheres)
+    if (group.kind == GroupKind::CURVES)
+        fill(group.curve_blocks);
+    else if (group.kind == GroupKind::SPHERES)
         fill(group.sphere_blocks);
     else
         fill(group.blocks);
@@ -188,14 +224,15 @@ void fill_flags(Group& group, const std::vector<u32>& refs, const Gather& gather
 StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Gather& gather, BuildQuality quality,
                        std::vector<u32>* refs_kept, ThreadPool& pool) {
     u32 ref_count = gather.ref_count();
-    group.corners.assign(group.of_spheres ? 0 : 9 * size_t(ref_count), 0.0f);
-    group.spheres.assign(group.of_spheres ? 4 * size_t(ref_count) : 0, 0.0f);
+    group.corners.assign(group.kind == GroupKind::TRIANGLES ? 9 * size_t(ref_count) : 0, 0.0f);
+    group.spheres.assign(group.kind == GroupKind::SPHERES ? 4 * size_t(ref_count) : 0, 0.0f);
     std::vector<u32>& refs = *refs_kept;
     refs.resize(kept);
     pool.parallel_for(kept, GATHER_CHUNK, [&](size_t begin, size_t end, unsigned) {
         for (size_t i = begin; i < end; ++i) {
             u32 ref = refs[i] = boxes[i].id;
-            if (group.of_spheres) {
+            if (group.kind == GroupKind::CURVES) continue;  // lie in the group already
+            if (group.kind == GroupKind::SPHERES) {
                 Sphere s;
                 gather.read(ref, group.member_of(ref), &s);
                 std::copy_n(&s.center.x, 4, group.spheres.data() + 4 * size_t(ref));
@@ -207,9 +244,12 @@ StructureInput collect(Group& group, const PrimBox* boxes, size_t kept, const Ga
         }
     });
     if (gather.has_flags()) fill_flags(group, refs, gather, pool);
-    u32 triangle_count = group.of_spheres ? 0 : ref_count;
-    Primitives all = {group.corners.data(), group.spheres.data(), group.flags.empty() ? nullptr : group.flags.data(),
-                      triangle_count, ref_count - triangle_count};
+    Primitives all = {group.corners.data(),
+                      group.spheres.data(),
+                      group.flags.empty() ? nullptr : group.flags.data(),
+                      group.kind == GroupKind::TRIANGLES ? ref_count : 0,
+                      group.kind == GroupKind::SPHERES ? ref_count : 0,
+                      group.curves};
     return {all, refs.data(), u32(kept), quality};
 }
 
@@ -217,7 +257,7 @@ void make_structure(Group& group, const PrimBox* boxes, size_t kept, const Gathe
                     ThreadPool& pool) {
     std::vector<u32> refs;
     StructureInput input = collect(group, boxes, kept, gather, choice.quality, &refs, pool);
-    group.left = !group.of_spheres && kept >= choice.leave_from;
+    group.left = group.kind == GroupKind::TRIANGLES && kept >= choice.leave_from;
     if (!group.left) group.structure = build_structure(choice.kind, input, pool);
 }
 
@@ -244,6 +284,7 @@ Group::~Group() = default;
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                  const AccelChoice& choice, ThreadPool& pool) {
     if (group.deforms) return build_moving_group(group, scene, flags, choice, pool);
+    if (group.kind == GroupKind::CURVES) copy_curves(group, scene);
     Gather gather(group, scene, flags);
     size_t kept = 0;
     HugeArray<PrimBox> boxes = gather_boxes(group, gather, pool, &kept);

@@ -12,7 +12,8 @@
 namespace luch::cpu {
 
 // A child is an inner node's index, or LEAF | (items - 1) << LEAF_COUNT_SHIFT | first item; an empty slot
-// has a box that no ray enters. Items are blocks of four triangles or eight spheres, or instances in the top level.
+// has a box that no ray enters. Items are blocks of four triangles, eight spheres or eight
+// pieces of curves, or instances in the top level.
 constexpr u32 LEAF = 0x80000000u;
 constexpr u32 LEAF_COUNT_SHIFT = 28;
 constexpr u32 LEAF_MAX_ITEMS = 8;
@@ -48,6 +49,14 @@ struct alignas(32) SphereBlock {
     u32 ref[8];
 };
 static_assert(sizeof(SphereBlock) == 160);
+
+// Eight pieces of curves as capsules (geometry/curve.h). Empty lanes have no ref; their capsules are far away.
+struct alignas(32) CurveBlock {
+    float a[3][8], b[3][8];
+    float radius[8];
+    u32 ref[8];
+};
+static_assert(sizeof(CurveBlock) == 256);
 
 // An array that asks for huge pages: incoherent rays then miss the TLB less.
 template <class T>

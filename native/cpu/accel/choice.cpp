@@ -46,8 +46,12 @@ double seconds_now() {
 Vec3 point_on_scene(const SceneView& scene, u32 number) {
     const InstanceView& instance = scene.instances[hash_u32(number, 0) % scene.instance_count];
     const MeshView& mesh = scene.meshes[instance.mesh];
-    if (primitive_count(mesh) == 0) return make_vec3(0.0f);
-    u32 prim = hash_u32(number, 1) % primitive_count(mesh);
+    if (primitive_count(scene, mesh) == 0) return make_vec3(0.0f);
+    u32 prim = hash_u32(number, 1) % primitive_count(scene, mesh);
+    if (is_curve(mesh, prim)) {
+        Capsule c = piece_capsule(curves_of(scene, mesh), prim - first_piece(mesh));
+        return transform_point(instance.to_world, c.a);
+    }
     if (is_sphere(mesh, prim)) {
         const float* s = sphere_at(scene, mesh, prim);
         float up = 2.0f * unit_float(hash_u32(number, 2)) - 1.0f;
@@ -91,13 +95,14 @@ double measure(const Accel& accel, const std::vector<Ray>& rays) {
 // Counted as often as instances let them stand.
 u64 standing_primitives(const SceneView& scene) {
     u64 count = 0;
-    for (u32 i = 0; i < scene.instance_count; ++i) count += primitive_count(scene.meshes[scene.instances[i].mesh]);
+    for (u32 i = 0; i < scene.instance_count; ++i)
+        count += primitive_count(scene, scene.meshes[scene.instances[i].mesh]);
     return count;
 }
 
 u64 distinct_primitives(const SceneView& scene) {
     u64 count = 0;
-    for (u32 m = 0; m < scene.mesh_count; ++m) count += primitive_count(scene.meshes[m]);
+    for (u32 m = 0; m < scene.mesh_count; ++m) count += primitive_count(scene, scene.meshes[m]);
     return count;
 }
 

@@ -3,6 +3,7 @@
 
 #include "cpu/accel/accel.h"
 #include "cpu/accel/build_moving.h"
+#include "cpu/accel/curve_blocks.h"
 #include "cpu/accel/leaf.h"
 #include "cpu/accel/sphere_blocks.h"
 #include "cpu/accel/traverse.h"
@@ -42,7 +43,11 @@ u8 any_in_tree(const Group& group, const LaneRay& ray, float t_min, float t_max,
 // Calls act with the type of the ray that the group's leaves take.
 template <class Act>
 auto with_block_ray(const Group& group, Act&& act) {
-    if (group.of_spheres) {
+    if (group.kind == GroupKind::CURVES) {
+        if (group.precision == Precision::FAST) return act.template operator()<CurveBlockRay<Precision::FAST>>();
+        return act.template operator()<CurveBlockRay<Precision::WATERTIGHT>>();  // double already
+    }
+    if (group.kind == GroupKind::SPHERES) {
         if (group.precision == Precision::FAST) return act.template operator()<SphereBlockRay<Precision::FAST>>();
         return act.template operator()<SphereBlockRay<Precision::WATERTIGHT>>();  // double already
     }

@@ -1,5 +1,6 @@
-// A group: the triangles of one mesh in its own space, or of several instances taken to the world; or the spheres of
-// one mesh in its own space (an instance may stretch them, so they are never taken to the world). It has one tree.
+// A group: the triangles of one mesh in its own space, or of several instances taken to the world; or the spheres or
+// the curves of one mesh in its own space (an instance may stretch it, so they are never taken to the world). It has one
+// tree.
 #pragma once
 #include <vector>
 
@@ -17,22 +18,28 @@ struct MovingTrees;  // build_moving.h
 
 using Member = GroupMember;
 
+enum class GroupKind : u8 { TRIANGLES, SPHERES, CURVES };
+
 struct Group {
     std::vector<Member> members;  // by instance
-    bool of_spheres = false;      // else of triangles
+    GroupKind kind = GroupKind::TRIANGLES;
     Precision precision = Precision::WATERTIGHT;
-    HugeArray<Node8> nodes;       // the wide tree; none: structure holds the group
+    HugeArray<Node8> nodes;  // the wide tree; none: structure holds the group
     HugeArray<Block4> blocks;
     HugeArray<SphereBlock> sphere_blocks;
+    HugeArray<CurveBlock> curve_blocks;
     std::unique_ptr<Structure> structure;
-    std::vector<float> corners;   // of structure's triangles: nine floats a ref
-    std::vector<float> spheres;   // of structure's spheres: four floats a ref
-    std::vector<u8> flags;        // PrimitiveFlag by ref; empty: none
-    bool left = false;            // a device builds its structure from corners (zeros where dropped) and flags
+    std::vector<float> corners;  // of structure's triangles: nine floats a ref
+    std::vector<float> spheres;  // of structure's spheres: four floats a ref
+    CurveSet curves = {};  // of the two arrays below; a ref is a piece
+    std::vector<float> curve_points;
+    std::vector<u32> curve_segments;
+    std::vector<u8> flags;  // PrimitiveFlag by ref; empty: none
+    bool left = false;  // a device builds its structure from corners (zeros where dropped) and flags
     Box root;
-    bool deforms = false;         // its mesh changes its shape: moving holds it, and nothing above
+    bool deforms = false;  // its mesh changes its shape: moving holds it, and nothing above
     std::unique_ptr<MovingTrees> moving;
-    u64 kept = 0, dropped = 0;    // primitives
+    u64 kept = 0, dropped = 0;  // primitives
 
     Group();
     Group(Group&&) noexcept;
@@ -42,7 +49,7 @@ struct Group {
     const Member& member_of(u32 ref) const { return luch::member_of(members.data(), u32(members.size()), ref); }
 };
 
-// Fills everything but members, of_spheres and deforms, which say what to gather. flags: per mesh, per primitive PrimitiveFlag.
+// Fills everything but members, kind and deforms, which say what to gather. flags: per mesh, per primitive PrimitiveFlag.
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,
                  const AccelChoice& choice, ThreadPool& pool);
 

@@ -63,7 +63,10 @@ std::vector<u8> meshes_to_flatten(const SceneView& scene, u64 budget) {
 class Planner {
  public:
     explicit Planner(const SceneView& scene)
-        : scene_(scene), group_of_triangles_(scene.mesh_count, NONE), group_of_spheres_(scene.mesh_count, NONE) {}
+        : scene_(scene),
+          group_of_triangles_(scene.mesh_count, NONE),
+          group_of_spheres_(scene.mesh_count, NONE),
+          group_of_curves_(scene.mesh_count, NONE) {}
 
     // Those taken to the world share a group where they are seen alike and refs suffice.
     void add_to_world(u32 i) {
@@ -83,12 +86,19 @@ class Planner {
     }
     void share_triangles(u32 i) {
         u32 mesh = scene_.instances[i].mesh;
-        share(i, {mesh, NONE, 0, 0, scene_.meshes[mesh].triangle_count}, false, &group_of_triangles_[mesh]);
+        share(i, {mesh, NONE, 0, 0, scene_.meshes[mesh].triangle_count}, GroupKind::TRIANGLES,
+              &group_of_triangles_[mesh]);
     }
     void share_spheres(u32 i) {
         u32 mesh = scene_.instances[i].mesh;
         const MeshView& view = scene_.meshes[mesh];
-        share(i, {mesh, NONE, 0, view.triangle_count, view.sphere_count}, true, &group_of_spheres_[mesh]);
+        share(i, {mesh, NONE, 0, view.triangle_count, view.sphere_count}, GroupKind::SPHERES, &group_of_spheres_[mesh]);
+    }
+    void share_curves(u32 i) {
+        u32 mesh = scene_.instances[i].mesh;
+        const MeshView& view = scene_.meshes[mesh];
+        u32 pieces = piece_count(curves_of(scene_, view));
+        share(i, {mesh, NONE, 0, first_piece(view), pieces}, GroupKind::CURVES, &group_of_curves_[mesh]);
     }
 
     ScenePlan plan;
@@ -100,24 +110,27 @@ class Planner {
         u64 refs;
     };
     // The group of these primitives of a mesh, in the mesh's own space, is made for the first instance that asks.
-    void share(u32 i, const Member& primitives, bool of_spheres, u32* group) {
+    void share(u32 i, const Member& primitives, GroupKind kind, u32* group) {
         if (*group == NONE) {
             *group = u32(plan.groups.size());
             Group& made = plan.groups.emplace_back();
             made.members = {primitives};
-            made.of_spheres = of_spheres;
-            made.deforms = !of_spheres && scene_.motion && scene_.motion->meshes[primitives.mesh].key_count != 0;
+            made.kind = kind;
+            made.deforms =
+                kind == GroupKind::TRIANGLES && scene_.motion && scene_.motion->meshes[primitives.mesh].key_count != 0;
         }
         const InstanceView& instance = scene_.instances[i];
         if (is_finite(instance.to_world) && is_finite(instance.to_object))
             plan.entries.push_back({instance.to_object, *group, i, instance.visibility,
                                     plan.motion.add(scene_, i, plan.groups[*group].deforms ? *group : NONE)});
         else
-            (of_spheres ? plan.dropped_spheres : plan.dropped_triangles) += primitives.prim_count;
+            (kind == GroupKind::CURVES    ? plan.dropped_pieces
+             : kind == GroupKind::SPHERES ? plan.dropped_spheres
+                                          : plan.dropped_triangles) += primitives.prim_count;
     }
 
     const SceneView& scene_;
-    std::vector<u32> group_of_triangles_, group_of_spheres_;
+    std::vector<u32> group_of_triangles_, group_of_spheres_, group_of_curves_;
     std::vector<FlatGroup> flat_;
 };
 
@@ -136,6 +149,7 @@ ScenePlan plan_scene(const SceneView& scene, u64 flatten_triangles) {
         else if (mesh.triangle_count > 0)
             planner.share_triangles(i);
         if (mesh.sphere_count > 0) planner.share_spheres(i);
+        if (mesh.segment_count > 0) planner.share_curves(i);
     }
     return std::move(planner.plan);
 }
@@ -161,8 +175,10 @@ void build_groups(ScenePlan& plan, const SceneView& scene, const std::vector<std
 }
 
 void count_primitives(const Group& group, AccelStats* stats) {
-    (group.of_spheres ? stats->spheres : stats->triangles) += group.kept;
-    (group.of_spheres ? stats->dropped_spheres : stats->dropped_triangles) += group.dropped;
+    u64 *kept[] = {&stats->triangles, &stats->spheres, &stats->pieces},
+        *dropped[] = {&stats->dropped_triangles, &stats->dropped_spheres, &stats->dropped_pieces};
+    *kept[size_t(group.kind)] += group.kept;
+    *dropped[size_t(group.kind)] += group.dropped;
 }
 
 EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene) {

@@ -13,7 +13,7 @@ struct ScenePlan {
     std::vector<Group> groups;                       // what to gather
     std::vector<GroupEntry> entries;
     SceneMotion motion;
-    u64 dropped_triangles = 0, dropped_spheres = 0;  // of instances whose transforms are not finite
+    u64 dropped_triangles = 0, dropped_spheres = 0, dropped_pieces = 0;  // of instances whose transforms are not finite
 };
 
 // flatten_triangles: how many copies of triangles there may be of instances taken to the world.

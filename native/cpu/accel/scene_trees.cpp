@@ -172,14 +172,25 @@ class SceneTreesOf final : public SceneTrees {
             group.corners = group.spheres = {};
             group.flags = {};
         } else if (!OWNS_PRIMITIVES<View>) {
-            traced.primitives = {group.corners.data(), group.spheres.data(),
-                                 group.flags.empty() ? nullptr : group.flags.data(), u32(group.corners.size() / 9),
-                                 u32(group.spheres.size() / 4)};
+            traced.primitives = {group.corners.data(),
+                                 group.spheres.data(),
+                                 group.flags.empty() ? nullptr : group.flags.data(),
+                                 u32(group.corners.size() / 9),
+                                 u32(group.spheres.size() / 4),
+                                 {}};
             note(g, "corners", offsetof(Traced, primitives) + offsetof(Primitives, corners), group.corners);
             note(g, "spheres", offsetof(Traced, primitives) + offsetof(Primitives, spheres), group.spheres);
             note(g, "flags", offsetof(Traced, primitives) + offsetof(Primitives, flags), group.flags);
         }
+        if (group.kind == GroupKind::CURVES) trace_curves(g, &traced);
         traced_.push_back(traced);
+    }
+    void trace_curves(u32 g, Traced* traced) {
+        const Group& group = groups_[g];
+        constexpr size_t field = offsetof(Traced, primitives) + offsetof(Primitives, curves);
+        traced->primitives.curves = group.curves;
+        note(g, "curve points", field + offsetof(CurveSet, points), group.curve_points);
+        note(g, "curve segments", field + offsetof(CurveSet, segments), group.curve_segments);
     }
     template <class T>
     void note(u32 group, const char* name, size_t field, const std::vector<T>& array) {
@@ -189,6 +200,7 @@ class SceneTreesOf final : public SceneTrees {
     void count(const ScenePlan& plan) {
         stats_.dropped_triangles = plan.dropped_triangles;
         stats_.dropped_spheres = plan.dropped_spheres;
+        stats_.dropped_pieces = plan.dropped_pieces;
         stats_.groups = groups_.size();
         stats_.entries = plan.entries.size();
         stats_.nodes = top_nodes_.size();

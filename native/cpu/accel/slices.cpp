@@ -25,6 +25,28 @@ void add_edge(f8 a, f8 b, int axis, const float* planes, int count, f8* out) {
     out[part] = united(out[part], b);
 }
 
+// Each part of the axis with the ball's room before and behind it, widened by the radius; returns the error.
+float cut_capsule(const Capsule& c, int axis, const float* planes, int count, f8* out) {
+    float from = c.a[axis], to = c.b[axis], inverse = safe_divide(1.0f, to - from);
+    for (int i = 0; i <= count; ++i) {
+        float lo = i > 0 ? planes[i - 1] - c.radius : -INFINITE_DISTANCE;
+        float hi = i < count ? planes[i] + c.radius : INFINITE_DISTANCE;
+        float s0 = 0.0f, s1 = 1.0f;
+        if (inverse != 0.0f) {
+            float first = (lo - from) * inverse, last = (hi - from) * inverse;
+            s0 = max_f(min_f(first, last), 0.0f);
+            s1 = min_f(max_f(first, last), 1.0f);
+        }
+        if (!(s0 <= s1)) continue;
+        Vec3 p = c.a + (c.b - c.a) * s0, q = c.a + (c.b - c.a) * s1;
+        f8 a = point(&p.x), b = point(&q.x);
+        out[i] = united(united(a + c.radius, a - c.radius), united(b + c.radius, b - c.radius));
+        if (i > 0) out[i][axis] = min_f(out[i][axis], -planes[i - 1]);
+        if (i < count) out[i][axis + 4] = min_f(out[i][axis + 4], planes[i]);
+    }
+    return CUT_ERROR * (max_component(abs_v(c.b - c.a)) + c.radius);
+}
+
 int slices_for(u32 refs) { return refs <= 16 ? 4 : refs <= 64 ? 8 : MAX_SLICES; }
 
 }  // namespace
@@ -38,6 +60,8 @@ void Clipper::cut(const PrimBox& ref, int axis, const float* planes, int count, 
         for (int k = 0; k < 3; ++k) add_edge(corners[k], corners[(k + 1) % 3], axis, planes, count, out);
         f8 whole = united(united(corners[0], corners[1]), corners[2]);
         error = CUT_ERROR * max_f(whole[0] + whole[4], max_f(whole[1] + whole[5], whole[2] + whole[6]));
+    } else if (is_piece(all_, ref.id)) {
+        error = cut_capsule(piece_capsule(all_.curves, piece_of(all_, ref.id)), axis, planes, count, out);
     } else {
         const float* s = all_.spheres + 4 * u64(ref.id - all_.triangle_count);
         const float radius = abs_f(s[3]);

@@ -30,7 +30,7 @@ __device__ __forceinline__ Primitives fill_tile(const BruteForce& list, const Pr
         for (int c = 0; c < 4; ++c)
             tile->spheres[4 * (k - triangles) + c] = all.spheres[4 * u64(ref - all.triangle_count) + c];
     __syncthreads();
-    return {tile->corners, tile->spheres, nullptr, triangles, count - triangles};
+    return {tile->corners, tile->spheres, nullptr, triangles, count - triangles, {}};
 }
 
 // Own ray, shared triangles: the block walks through all tiles together.

@@ -10,6 +10,7 @@ struct TreeRays {
     const RayBatch& batch;
 };
 __device__ __forceinline__ const Cwbvh& tree_of(const TreeRays& rays) { return rays.tree; }
+__device__ __forceinline__ CurveSet curves_in(const TreeRays&) { return {}; }
 __device__ __forceinline__ u32 ray_count(const TreeRays& rays) { return rays.batch.count; }
 __device__ __forceinline__ u32* next_ray(const TreeRays& rays) { return rays.batch.next; }
 __device__ __forceinline__ bool load_ray(const TreeRays& rays, u32 i, Ray* ray) { return load_ray(rays.batch, i, ray); }

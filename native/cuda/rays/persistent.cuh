@@ -2,7 +2,7 @@
 // first entries of each stack in shared memory, leaves that wait until enough lanes of the warp are at one (Aila,
 // Laine 2009; Ylitie, Karras, Laine 2017). What is computed is luch/accel/cwbvh.h's: the same hits in any order.
 //
-// Rays: a tree, where its rays come from and results go: with tree_of, ray_count, next_ray, load_ray, store_hit and
+// Rays: a tree, where its rays come from and results go: with tree_of, curves_in, ray_count, next_ray, load_ray, store_hit and
 // store_blocked of its own.
 #pragma once
 #include "rays/structure.cuh"
@@ -190,7 +190,7 @@ struct Walker {
         NoCounters none;
         TriangleHit hit;
         RefHit best = aside->best;
-        if (!test_leaf(p, aside->tested, aside->t_min, best.t, &hit, none)) return false;
+        if (!test_leaf(p, curves_in(rays), aside->tested, aside->t_min, best.t, &hit, none)) return false;
         if constexpr (ANY) {
             bool maybe = p.flags & PRIMITIVE_MAY_BE_TRANSPARENT;
             blocked = maybe ? u8(BLOCKED_MAYBE) : u8(BLOCKED_OPAQUE);

@@ -1,4 +1,5 @@
 // The stages that run no shader program: beginning paths, sorting hits by material, passing on to the next round.
+#define LUCH_PLAN_CURVES 1  // which material a hit has
 #include "luch/integrator/camera_path.h"
 #include "luch/integrator/wavefront.h"
 #include "render/launch.cuh"

@@ -2,6 +2,9 @@
 #ifndef LUCH_TRANSPARENT
 #define LUCH_TRANSPARENT 1  // some material lets light through
 #endif
+#ifndef LUCH_PLAN_CURVES
+#define LUCH_PLAN_CURVES 1
+#endif
 #ifndef LUCH_STRUCTURE
 #define LUCH_STRUCTURE Cwbvh
 #endif

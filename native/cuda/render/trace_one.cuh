@@ -11,6 +11,9 @@ struct OneGroupRays {
 };
 
 __device__ __forceinline__ const Cwbvh& tree_of(const OneGroupRays& rays) { return rays.scene.only.structure; }
+__device__ __forceinline__ const CurveSet& curves_in(const OneGroupRays& rays) {
+    return rays.scene.only.primitives.curves;
+}
 __device__ __forceinline__ u32 ray_count(const OneGroupRays& rays) { return ray_count(rays.task); }
 __device__ __forceinline__ u32* next_ray(const OneGroupRays& rays) { return rays.task.next; }
 __device__ __forceinline__ bool load_ray(const OneGroupRays& rays, u32 i, Ray* ray) {

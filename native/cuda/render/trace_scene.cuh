@@ -163,7 +163,9 @@ struct SceneWalker {
         NoCounters none;
         TriangleHit hit;
         RefHit best = aside->best;
-        if (!test_leaf(p, aside->tested, aside->t_min, best.t, &hit, none)) return false;
+        // Without curves in the code nothing of this is looked up.
+        const CurveSet& curves = rays.scene.groups[rays.scene.top.leaves[aside->entry].group].primitives.curves;
+        if (!test_leaf(p, curves, aside->tested, aside->t_min, best.t, &hit, none)) return false;
         if constexpr (ANY) {
             bool maybe = p.flags & PRIMITIVE_MAY_BE_TRANSPARENT;
             blocked = maybe ? u8(BLOCKED_MAYBE) : u8(BLOCKED_OPAQUE);

@@ -2,7 +2,14 @@
 // neither has the code. General code has them all: the CPU's, and the kernels that are compiled ahead of time. A
 // scene's own kernels get their -D from luch/cuda/plan.py, which reads luch.effects.
 #pragma once
+#include "luch/platform.h"
 
+#ifndef LUCH_PLAN_CURVES
+#define LUCH_PLAN_CURVES !LUCH_CUDA  // kernels that trace are compiled again for scenes with hair
+#endif
+#ifndef LUCH_PLAN_HAIR
+#define LUCH_PLAN_HAIR 1
+#endif
 #ifndef LUCH_PLAN_THIN_FILM
 #define LUCH_PLAN_THIN_FILM 1
 #endif
@@ -81,6 +88,8 @@
 
 namespace luch::plan {
 
+inline constexpr bool CURVES = LUCH_PLAN_CURVES;  // primitives that are pieces of hair
+inline constexpr bool HAIR = LUCH_PLAN_HAIR;  // lobes of hair
 inline constexpr bool THIN_FILM = LUCH_PLAN_THIN_FILM;
 inline constexpr bool SHEEN = LUCH_PLAN_SHEEN;  // Sheen and velvet lobes
 inline constexpr bool TOON = LUCH_PLAN_TOON;

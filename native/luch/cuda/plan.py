@@ -15,6 +15,8 @@ from luch.effects.forcing import ALL
 NEEDED_BY: dict[str, tuple[str, ...]] = {
     "THIN_FILM": ("thin film",),
     "SHEEN": ("sheen",),
+    "CURVES": ("hair",),
+    "HAIR": ("hair shading",),
     "ROUND_LAMPS": ("point lamps", "spot lamps"),
     "AREA_LAMPS": ("area lamps",),
     "SUNS": ("sun lamps",),

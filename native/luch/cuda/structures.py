@@ -26,7 +26,7 @@ class DeviceStructure:
         self.kind = kind
         self._view, self._arrays, self._sources, self._stats = view, arrays, sources, stats
         pointers = [a.data.ptr if a.size else 0 for a in sources]
-        self._primitives = struct.pack("<QQQII", *pointers, len(sources[0]), len(sources[1]))
+        self._primitives = struct.pack("<QQQII32x", *pointers, len(sources[0]), len(sources[1]))
 
     @classmethod
     def uploaded(

@@ -15,6 +15,7 @@ from luch.cuda.upload import Blocks, DeviceCopy, Links
 
 BLOCK = 128  # RAY_BLOCK of rays/structure.cuh
 MOVING = ("-DLUCH_PLAN_MOTION=1",)
+CURVES = ("-DLUCH_PLAN_CURVES=1",)
 TIMED_RAYS = ("-DLUCH_TIMED_RAYS=1",)
 HIT = np.dtype([("t", "<f4"), ("prim", "<i4"), ("instance", "<i4"), ("u", "<f4"), ("v", "<f4")])  # luch::Hit; -1: NONE
 
@@ -50,15 +51,15 @@ class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
     def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, one_group: bool, left: Left = (),
-                 depth: int = 0, moves: bool = False, timed: bool = False) -> None:  # fmt: skip
+                 depth: int = 0, moves: bool = False, curves: bool = False, timed: bool = False) -> None:  # fmt: skip
         """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for.
 
         left: groups that the device builds, if any; depth: of the trees that were built; moves: something in them does;
-        timed: `ticks` of closest() and any() are written.
-        May raise TreesTooDeep.
+        curves: some group holds hair; timed: `ticks` of closest() and any() are written. Kernels lack the code of what
+        is not asked for. May raise TreesTooDeep.
         """
         self._trees = upload_trees(blocks, links, left, depth)
-        self._module = load(f"TRACE_{kind}", precision, MOVING * moves + TIMED_RAYS * timed)
+        self._module = load(f"TRACE_{kind}", precision, MOVING * moves + CURVES * curves + TIMED_RAYS * timed)
         one = "_one" if one_group and kind == "CWBVH" else ""
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
 

@@ -31,6 +31,11 @@ LAYOUTS = {
     "CLOSURE_METALLIC": f"base_color:3 edge_tint:3 ior:3 extinction:3 {_METAL} {_FILM}",
     "CLOSURE_GLASS": f"color:3 roughness ior normal:3 {_FILM}",
     "CLOSURE_REFRACTION": "color:3 roughness ior normal:3",
+    "CLOSURE_HAIR": "color:3 offset roughness_along roughness_around tangent:3",
+    "CLOSURE_PRINCIPLED_HAIR": (
+        "color:3 melanin melanin_redness tint:3 absorption:3 roughness radial_roughness coat ior offset random_color "
+        "random_roughness random"
+    ),
     "CLOSURE_SUBSURFACE": "color:3 radius:3 ior alpha anisotropy normal:3",
     "CLOSURE_PRINCIPLED": _PRINCIPLED,
     "CLOSURE_PRINCIPLED_SUBSURFACE": f"subsurface_radius:3 subsurface_ior {_PRINCIPLED}",
@@ -144,6 +149,8 @@ class Closure:
             dead |= {"rotation", "tangent"}
         if self.name == "CLOSURE_METALLIC":  # params[2]: physical conductor
             dead |= {"base_color", "edge_tint"} if self.node.params[2] else {"ior", "extinction"}
+        if self.name == "CLOSURE_PRINCIPLED_HAIR":
+            return self._dead_hair_inputs()
         if self.name not in PRINCIPLED:
             return dead
         if not self.may_pass("coat_weight"):
@@ -162,6 +169,15 @@ class Closure:
             dead |= {"subsurface_radius", "subsurface_ior"}
         if not self.may_pass("subsurface_weight") or not (self.scatters_inside() or self.number("thin_wall") != 0.0):
             dead.add("subsurface_anisotropy")
+        return dead
+
+    def _dead_hair_inputs(self) -> set[str]:
+        # params[1]: HairColor of bsdf/setup_hair.h
+        colors = ({"absorption"}, {"melanin", "melanin_redness", "tint", "random_color"}, {"color"})
+        dead = set().union(*colors) - colors[self.node.params[1]]
+        random_color = "random_color" not in dead and self.number("random_color") != 0.0
+        if not random_color and self.number("random_roughness") == 0.0:
+            dead.add("random")
         return dead
 
 
@@ -283,6 +299,18 @@ def _subsurface(c: Closure) -> Facts:
         yield "subsurface", f"scatters light under its surface{_by_method(c, 1)}"
 
 
+def _hair(c: Closure) -> Facts:
+    # params[1]: transmission
+    yield "hair shading", "is a Hair BSDF"
+    yield ("hair transmission", "is hair that transmits") if c.node.params[1] else ("glossy", "is hair that reflects")
+
+
+def _principled_hair(c: Closure) -> Facts:
+    yield "hair shading", "is Principled Hair"
+    yield "glossy", "is hair"
+    yield "hair transmission", "is hair"
+
+
 def _mean(numbers: tuple[float, ...]) -> float:
     return sum(numbers) / len(numbers)
 
@@ -302,4 +330,6 @@ _TRAITS = {
     "CLOSURE_SUBSURFACE": _subsurface,
     "CLOSURE_PRINCIPLED": _principled,
     "CLOSURE_PRINCIPLED_SUBSURFACE": _principled,
+    "CLOSURE_HAIR": _hair,
+    "CLOSURE_PRINCIPLED_HAIR": _principled_hair,
 }

@@ -26,7 +26,6 @@ _COUNTS_BYTES = 4  # samples of a pixel
 # What the exporter meets and Luch cannot draw: effect, group, why it is off where nothing was met.
 _LATER = (
     ("stereoscopy", "Camera", "the scene is not stereoscopic"),
-    ("hair", "Geometry", "the scene has none"),
     ("heterogeneous volumes", "Geometry", "no volume changes from place to place"),
     ("displacement", "Geometry", "no material displaces its surface"),
     ("light linking", "Light", "no object uses it"),
@@ -54,7 +53,7 @@ def add_camera(effects: Effects, shown: Shown) -> None:
 
 
 def add_geometry(effects: Effects, shown: Shown) -> None:
-    """Instances, point clouds."""
+    """Instances, point clouds, hair."""
     repeated = {mesh: count for mesh, count in shown.uses.items() if count > 1}
     if repeated:
         triangles, spheres = (
@@ -75,6 +74,31 @@ def add_geometry(effects: Effects, shown: Shown) -> None:
         effects.add("Geometry", "point clouds", True, reason, cost="a search of their own for every ray")
     elif "point clouds" not in shown.scene.unsupported:  # as in a file of a Luch that could not draw them
         effects.add("Geometry", "point clouds", False, "the scene has none")
+    _add_hair(effects, shown)
+
+
+_SHAPES = {
+    "RIBBON": "ribbons that face each ray, in 2^{n} straight pieces a segment",
+    "THICK": "round curves",
+    "THICK_LINEAR": "round cones between their points",
+}
+
+
+def _add_hair(effects: Effects, shown: Shown) -> None:
+    curves = {mesh: curves for mesh in shown.uses if (curves := shown.scene.meshes[mesh].curves) is not None}
+    if curves:
+        first = shown.scene.meshes[next(iter(curves))].name
+        more = f" and {len(curves) - 1} more" if len(curves) > 1 else ""
+        count, points = (
+            sum(len(array) for array in arrays)
+            for arrays in zip(*((c.first, c.points) for c in curves.values()), strict=True)
+        )
+        settings = shown.scene.settings
+        shape = _SHAPES.get(settings.curve_shape, settings.curve_shape).format(n=min(settings.curve_subdivisions, 4))
+        reason = f'"{first}"{more}: {count:,} curves of {points:,} points, drawn as {shape}'
+        effects.add("Geometry", "hair", True, reason, cost="a search of their own for every ray")
+    elif "hair" not in shown.scene.unsupported:  # as in a file of a Luch that could not draw it
+        effects.add("Geometry", "hair", False, "the scene has none")
 
 
 def _triangle_count(mesh: Mesh) -> int:
@@ -95,7 +119,7 @@ def add_paths(effects: Effects, shown: Shown) -> None:
             effects,
             shown,
             "transmission",
-            ("transmission", "translucency", "thin subsurface"),
+            ("transmission", "translucency", "thin subsurface", "hair transmission"),
             settings.transmission_bounces,
         ),
     ]

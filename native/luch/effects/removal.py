@@ -210,6 +210,9 @@ REMOVALS: dict[str, Removal] = {
     "point clouds": Removal(
         "nothing", lambda scene: replace(scene, meshes=[replace(mesh, spheres=None) for mesh in scene.meshes])
     ),
+    "hair": Removal(
+        "nothing", lambda scene: replace(scene, meshes=[replace(mesh, curves=None) for mesh in scene.meshes])
+    ),
     "volumes": Removal("empty space", _no_volumes),
     "volume bounces": Removal("light scatters once", _settings(volume_bounces=0)),
     "indirect light": Removal("direct light alone", _settings(max_bounces=0)),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from luch.effects.programs import Reading, read_program
-from luch.scene import Medium, Mesh, Scene
+from luch.scene import Medium, Scene
 
 SHADOW = 32  # RayKind bit of shadow rays, as in Object.visibility
 _BLOCK = 1 << 20  # slots that are counted at a time: counting widens them to 8 bytes each
@@ -25,6 +25,7 @@ class Surface:
     sampled_as_light: bool
     triangles: int = 0  # that show it, over all instances
     spheres: int = 0
+    curves: int = 0
     blocks_light: bool = False  # some object with it is seen by shadow rays
     volume: Medium | None = None  # behind it
 
@@ -38,7 +39,7 @@ class Shown:
     """What every effect is decided from."""
 
     scene: Scene
-    surfaces: list[Surface] = field(default_factory=list)  # that are on some triangle or sphere
+    surfaces: list[Surface] = field(default_factory=list)  # that are on some triangle, sphere or curve
     idle: list[Surface] = field(default_factory=list)  # on none
     uses: dict[int, int] = field(default_factory=dict)  # mesh -> instances of it that are drawn
     holdouts: list[str] = field(default_factory=list)  # objects
@@ -62,7 +63,8 @@ def look_at(scene: Scene) -> Shown:
     ]
     _count(shown, surfaces)
     for surface in surfaces:
-        (shown.surfaces if surface.triangles or surface.spheres else shown.idle).append(surface)
+        drawn = surface.triangles or surface.spheres or surface.curves
+        (shown.surfaces if drawn else shown.idle).append(surface)
     return shown
 
 
@@ -95,7 +97,7 @@ def _count(shown: Shown, surfaces: list[Surface]) -> None:
         if not count or not subject.visibility or subject.mesh >= len(scene.meshes):
             continue
         if subject.mesh not in slots:
-            slots[subject.mesh] = _triangles_by_slot(scene.meshes[subject.mesh])
+            slots[subject.mesh] = _by_slot(scene.meshes[subject.mesh].material_slots)
         shown.uses[subject.mesh] = shown.uses.get(subject.mesh, 0) + count
         if subject.holdout:
             shown.holdouts.append(subject.name)
@@ -112,13 +114,19 @@ def _count(shown: Shown, surfaces: list[Surface]) -> None:
             surface = surfaces[subject.materials[0]]
             surface.spheres += len(spheres) * count
             surface.blocks_light |= bool(subject.visibility & SHADOW)
+        curves = scene.meshes[subject.mesh].curves
+        if curves is not None and subject.materials:
+            for slot, number in enumerate(_by_slot(curves.material_slots).tolist()):
+                surface = surfaces[subject.materials[min(slot, len(subject.materials) - 1)]]
+                surface.curves += number * count
+                surface.blocks_light |= bool(number and subject.visibility & SHADOW)
 
 
-def _triangles_by_slot(mesh: Mesh) -> NDArray[np.int64]:
-    """How many triangles name each material slot, (slots,)."""
+def _by_slot(material_slots: NDArray[np.uint16]) -> NDArray[np.int64]:
+    """How many triangles or curves name each material slot, (slots,)."""
     total = np.zeros(0, np.int64)
-    for start in range(0, len(mesh.material_slots), _BLOCK):
-        part = np.bincount(mesh.material_slots[start : start + _BLOCK], minlength=len(total))
+    for start in range(0, len(material_slots), _BLOCK):
+        part = np.bincount(material_slots[start : start + _BLOCK], minlength=len(total))
         part[: len(total)] += total
         total = part
     return total

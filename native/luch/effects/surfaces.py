@@ -11,6 +11,7 @@ _TRAITS = {
     "translucency": "no material has a Translucent BSDF",
     "coat": "every coat weight is 0",
     "sheen": "every sheen weight is 0",
+    "hair shading": "no material is hair",
     "anisotropy": "every anisotropy is 0",
     "thin film": "every thin film has thickness 0",
 }
@@ -114,12 +115,16 @@ def _add_subsurface(effects: Effects, shown: Shown) -> None:
     cost = "such a path goes on inside, by some tens of rays, and the objects have one tree more"
     add_trait(effects, "Surfaces", "subsurface", "subsurface", shown, off, cost=cost)
     found = [surface for surface in shown.surfaces if "subsurface" in surface.traits]
-    points = [surface for surface in found if surface.spheres]
+    points = [surface for surface in found if surface.spheres or surface.curves]
     if points:
-        reason = f"{facts(points, 'subsurface')}: diffuse on the spheres of point clouds"
+        of = " and ".join(
+            ["the spheres of point clouds"] * any(surface.spheres for surface in points)
+            + ["hair"] * any(surface.curves for surface in points)
+        )
+        reason = f"{facts(points, 'subsurface')}: diffuse on {of}"
         effects.add("Surfaces", "subsurface of points", False, reason, missing=True)
     if found and len(points) == len(found) and not any(surface.triangles for surface in found):
-        effects.add("Surfaces", "subsurface", False, "it is on point clouds alone, which show it as diffuse")
+        effects.add("Surfaces", "subsurface", False, "it is on point clouds or hair alone, which show it as diffuse")
 
 
 def _add_holdout(effects: Effects, shown: Shown) -> None:

@@ -18,12 +18,14 @@ struct alignas(16) CwbvhNode {
 };
 static_assert(sizeof(CwbvhNode) == 80);
 
-// A primitive where its leaf needs it: triangle a, b, c; sphere centre a, radius b[0].
+// A primitive where its leaf needs it: triangle a, b, c; sphere centre a, radius b[0]; of a curve's piece the capsule a, b,
+// c[0], the rest is fetched where the ray comes near that.
+enum LeafKind : u32 { LEAF_TRIANGLE, LEAF_SPHERE, LEAF_PIECE };
 struct alignas(16) LeafPrimitive {
     float a[3];
     u32 ref;
     float b[3];
-    u32 is_sphere;
+    u32 kind;   // LeafKind
     float c[3];
     u32 flags;  // PrimitiveFlag
 };
@@ -130,17 +132,23 @@ LUCH_FN void walk(const CwbvhOf<Item>& tree, const WideRay& ray, Stack& stack, L
     }
 }
 
+// curves: those of the tree's group.
 template <Precision P, class Count>
-LUCH_FN bool test_leaf(const LeafPrimitive& p, const PrimitiveRay<P>& ray, float t_min, float t_max, TriangleHit* hit,
-                       Count& count) {
+LUCH_FN bool test_leaf(const LeafPrimitive& p, const CurveSet& curves, const PrimitiveRay<P>& ray, float t_min,
+                       float t_max, TriangleHit* hit, Count& count) {
     count.primitive(sizeof(LeafPrimitive));
-    if (!p.is_sphere) return ray.triangle(vec3_of(p.a), vec3_of(p.b), vec3_of(p.c), t_min, t_max, hit);
+    if (plan::CURVES && p.kind == LEAF_PIECE) {
+        if (!line_may_touch({vec3_of(p.a), vec3_of(p.b), p.c[0]}, ray.origin, ray.direction)) return false;
+        return test_piece<P>(curves, p.ref, ray.origin, ray.direction, t_min, t_max, hit);
+    }
+    if (p.kind == LEAF_TRIANGLE) return ray.triangle(vec3_of(p.a), vec3_of(p.b), vec3_of(p.c), t_min, t_max, hit);
     hit->u = hit->v = 0.0f;
     return intersect_sphere<P>(ray.origin, ray.direction, {vec3_of(p.a), p.b[0]}, t_min, t_max, &hit->t);
 }
 
 template <Precision P, class Count>
 struct ClosestOfLeaves {
+    const CurveSet& curves;
     PrimitiveRay<P> ray;
     float t_min;
     RefHit* best;
@@ -149,13 +157,14 @@ struct ClosestOfLeaves {
     LUCH_FN bool operator()(const LeafPrimitive& stored) {
         const LeafPrimitive p = stored;
         TriangleHit hit;
-        if (test_leaf(p, ray, t_min, best->t, &hit, count) && is_closer(hit.t, p.ref, *best))
+        if (test_leaf(p, curves, ray, t_min, best->t, &hit, count) && is_closer(hit.t, p.ref, *best))
             *best = {hit.t, p.ref, hit.u, hit.v};
         return false;
     }
 };
 template <Precision P, class Count>
 struct AnyOfLeaves {
+    const CurveSet& curves;
     PrimitiveRay<P> ray;
     float t_min, limit;
     u8 blocked;
@@ -164,35 +173,26 @@ struct AnyOfLeaves {
     LUCH_FN bool operator()(const LeafPrimitive& stored) {
         const LeafPrimitive p = stored;
         TriangleHit hit;
-        if (!test_leaf(p, ray, t_min, limit, &hit, count)) return false;
+        if (!test_leaf(p, curves, ray, t_min, limit, &hit, count)) return false;
         bool maybe = p.flags & PRIMITIVE_MAY_BE_TRANSPARENT;
         blocked = maybe ? u8(BLOCKED_MAYBE) : u8(BLOCKED_OPAQUE);
         return !maybe;
     }
 };
 
-template <Precision P, class Stack, class Count>
-LUCH_FN void closest_hit(const Cwbvh& tree, const Ray& ray, Stack& stack, RefHit* best, Count& count) {
-    ClosestOfLeaves<P, Count> leaf = {PrimitiveRay<P>(ray), ray.t_min, best, count};
+template <Precision P, class Count>
+LUCH_FN void closest_hit(const Cwbvh& tree, const Primitives& all, const Ray& ray, RefHit* best, Count& count) {
+    LocalStack<> stack;
+    ClosestOfLeaves<P, Count> leaf = {all.curves, PrimitiveRay<P>(ray), ray.t_min, best, count};
     walk(tree, make_wide_ray(ray, tree.root), stack, leaf, count);
 }
-template <Precision P, class Stack, class Count>
-LUCH_FN u8 any_hit(const Cwbvh& tree, const Ray& ray, Stack& stack, Count& count) {
-    AnyOfLeaves<P, Count> leaf = {PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count};
+// Of the primitives only curves are asked for: the rest lies in the tree's own leaves.
+template <Precision P, class Count>
+LUCH_FN u8 any_hit(const Cwbvh& tree, const Primitives& all, const Ray& ray, Count& count) {
+    LocalStack<> stack;
+    AnyOfLeaves<P, Count> leaf = {all.curves, PrimitiveRay<P>(ray), ray.t_min, ray.t_max, BLOCKED_NOT, count};
     walk(tree, make_wide_ray(ray, tree.root), stack, leaf, count);
     return leaf.blocked;
-}
-
-// As every structure: the primitives lie in the tree's own leaves.
-template <Precision P, class Count>
-LUCH_FN void closest_hit(const Cwbvh& tree, const Primitives&, const Ray& ray, RefHit* best, Count& count) {
-    LocalStack<> stack;
-    closest_hit<P>(tree, ray, stack, best, count);
-}
-template <Precision P, class Count>
-LUCH_FN u8 any_hit(const Cwbvh& tree, const Primitives&, const Ray& ray, Count& count) {
-    LocalStack<> stack;
-    return any_hit<P>(tree, ray, stack, count);
 }
 
 }  // namespace luch

@@ -1,38 +1,45 @@
-// What every structure is built over: triangles and spheres of one space, numbered by *ref*. Refs sort as the
+// What every structure is built over: triangles, spheres, pieces of curves of one space, numbered by *ref*. Refs sort as the
 // caller's (instance, primitive) do, so that on equal t the smaller ref wins. Structures store refs and call
 // `test_primitive`; the test alone decides what is hit, so the structure cannot change a picture.
 #pragma once
 #include "luch/geometry/box.h"
+#include "luch/geometry/curve_test.h"
 #include "luch/geometry/precision.h"
 #include "luch/geometry/ray.h"
 #include "luch/geometry/sphere.h"
 #include "luch/geometry/triangle.h"
 #include "luch/geometry/triangle_tests.h"
+#include "luch/plan.h"
 
 namespace luch {
 
 struct Primitives {
     const float* corners;  // nine floats a triangle: p0, p1, p2; by ref
     const float* spheres;  // four floats a sphere: centre, radius (see Sphere); by ref - triangle_count
-    const u8* flags;       // PrimitiveFlag by ref; null: none
+    const u8* flags;  // PrimitiveFlag by ref; null: none
     u32 triangle_count, sphere_count;
+    CurveSet curves;  // by ref - triangle_count - sphere_count
 };
+LUCH_FN bool is_piece(const Primitives& all, u32 ref) {
+    return plan::CURVES && ref >= all.triangle_count + all.sphere_count;
+}
+LUCH_FN u32 piece_of(const Primitives& all, u32 ref) { return ref - all.triangle_count - all.sphere_count; }
 
 enum PrimitiveFlag : u8 { PRIMITIVE_MAY_BE_TRANSPARENT = 1 };
 enum Blocked : u8 { BLOCKED_NOT = 0, BLOCKED_OPAQUE = 1, BLOCKED_MAYBE = 2 };
 
 struct RefHit {
-    float t;   // before a hit: the upper end of the ray's interval
-    u32 ref;   // NONE: nothing yet; a hit at exactly t then still counts
+    float t;  // before a hit: the upper end of the ray's interval
+    u32 ref;  // NONE: nothing yet; a hit at exactly t then still counts
     float u, v;
 };
 
 // What a traversal did. Kernels without counters take NoCounters, whose calls are nothing.
 struct Counters {
-    u64 nodes = 0;       // inner nodes or cells visited
-    u64 boxes = 0;       // boxes or split planes compared with the ray
+    u64 nodes = 0;  // inner nodes or cells visited
+    u64 boxes = 0;  // boxes or split planes compared with the ray
     u64 primitives = 0;  // primitive tests
-    u64 bytes = 0;       // of nodes, lists and primitives read
+    u64 bytes = 0;  // of nodes, lists and primitives read
     LUCH_FN void node(u32 size, u32 box_count) {
         ++nodes;
         boxes += box_count;
@@ -88,6 +95,14 @@ struct PrimitiveRay<Precision::DOUBLE> {
 
 LUCH_FN Vec3 vec3_of(const float* p) { return {p[0], p[1], p[2]}; }
 
+// Not inlined: the code of triangles and spheres beside it keeps its registers.
+template <Precision P>
+LUCH_FN_APART bool test_piece(const CurveSet& set, u32 piece, Vec3 origin, Vec3 direction, float t_min, float t_max,
+                              TriangleHit* hit) {
+    auto ray = make_curve_ray<typename CurveNumber<P>::Type>(origin, direction);
+    return intersect_piece(set, piece, ray, t_min, t_max, hit);
+}
+
 template <Precision P, class Count>
 LUCH_FN bool test_primitive(const Primitives& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, float t_max,
                             TriangleHit* hit, Count& count) {
@@ -95,6 +110,10 @@ LUCH_FN bool test_primitive(const Primitives& all, const PrimitiveRay<P>& ray, u
         const float* p = all.corners + 9 * u64(ref);
         count.primitive(36);
         return ray.triangle(vec3_of(p), vec3_of(p + 3), vec3_of(p + 6), t_min, t_max, hit);
+    }
+    if (is_piece(all, ref)) {
+        count.primitive(68);
+        return test_piece<P>(all.curves, piece_of(all, ref), ray.origin, ray.direction, t_min, t_max, hit);
     }
     const float* s = all.spheres + 4 * u64(ref - all.triangle_count);
     count.primitive(16);
@@ -108,6 +127,7 @@ LUCH_FN Box primitive_box(const Primitives& all, u32 ref) {
         const float* p = all.corners + 9 * u64(ref);
         return triangle_box(vec3_of(p), vec3_of(p + 3), vec3_of(p + 6));
     }
+    if (is_piece(all, ref)) return capsule_box(piece_capsule(all.curves, piece_of(all, ref)));
     const float* s = all.spheres + 4 * u64(ref - all.triangle_count);
     return sphere_box(vec3_of(s), s[3]);
 }

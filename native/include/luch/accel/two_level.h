@@ -12,7 +12,7 @@ namespace luch {
 template <class Structure>
 struct TracedGroup {
     Structure structure;
-    Primitives primitives;       // empty where the structure's leaves hold them
+    Primitives primitives;       // but for curves empty where the structure's leaves hold them
     const GroupMember* members;
     u32 member_count;
     u32 unused;

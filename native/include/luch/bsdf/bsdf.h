@@ -3,6 +3,8 @@
 #include "luch/bsdf/ashikhmin_shirley.h"
 #include "luch/bsdf/bump_shadow.h"
 #include "luch/bsdf/diffuse.h"
+#include "luch/bsdf/hair_fibre.h"
+#include "luch/bsdf/hair_lobes.h"
 #include "luch/bsdf/microfacet.h"
 #include "luch/bsdf/sheen.h"
 #include "luch/bsdf/toon.h"
@@ -14,6 +16,7 @@ LUCH_FN Vec3 mirrored_at(Vec3 w, Vec3 n) { return w - n * (2.0f * dot(w, n)); }
 
 LUCH_FN bool is_diffuse(LobeType t) { return t <= LobeType::SHEEN; }
 LUCH_FN bool is_subsurface(LobeType t) { return t >= LobeType::SUBSURFACE && t <= LobeType::SUBSURFACE_DISK; }
+LUCH_FN bool is_hair(LobeType t) { return plan::HAIR && t >= LobeType::HAIR_FIBRE && t <= LobeType::HAIR_TRANSMISSION; }
 
 // A lobe's light counts by its kind and, for glass, by the side it leaves on.
 LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
@@ -29,6 +32,7 @@ LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
         case LobeType::SHEEN:
             return CLASS_DIFFUSE;
         case LobeType::MICROFACET_REFRACTION:
+        case LobeType::HAIR_TRANSMISSION:
             return CLASS_TRANSMISSION;
         case LobeType::MICROFACET_GLASS:
             return dot(lobe.normal, wi) > 0.0f ? CLASS_GLOSSY : CLASS_TRANSMISSION;
@@ -67,6 +71,13 @@ LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
         case LobeType::MICROFACET_REFRACTION:
         case LobeType::MICROFACET_GLASS:
             if constexpr (plan::MICROFACETS) return eval_microfacet(lobe, wo, wi);
+            break;
+        case LobeType::HAIR_FIBRE:
+            if constexpr (plan::HAIR) return eval_fibre(lobe, wo, wi);
+            break;
+        case LobeType::HAIR_REFLECTION:
+        case LobeType::HAIR_TRANSMISSION:
+            if constexpr (plan::HAIR) return eval_hair(lobe, wo, wi);
             break;
         case LobeType::SUBSURFACE:
         case LobeType::SUBSURFACE_SKIN:
@@ -135,6 +146,9 @@ LUCH_FN LobeSample sample_lobe(const Lobe& lobe, Vec3 n_geometric, Vec3 wo, floa
     LobeSample s;
     if (plan::ASHIKHMIN_SHIRLEY && lobe.type == LobeType::ASHIKHMIN_SHIRLEY) {
         s = sample_ashikhmin_shirley(lobe, outside, seen_from, u);
+    } else if (is_hair(lobe.type)) {
+        s = lobe.type == LobeType::HAIR_FIBRE ? sample_fibre(lobe, seen_from, u_side, u)
+                                              : sample_hair(lobe, seen_from, u);
     } else if (plan::MICROFACETS && lobe.type >= LobeType::MICROFACET_REFLECTION) {
         s = sample_microfacet(lobe, outside, seen_from, u_side, u);
     } else {
@@ -202,6 +216,7 @@ LUCH_FN void blur_closures(ClosureSet& set, float roughness) {
         lobe.flags |= LOBE_BLURRED;
         lobe.alpha_x = max_f(lobe.alpha_x, roughness);
         lobe.alpha_y = max_f(lobe.alpha_y, roughness);
+        if (plan::HAIR && lobe.type == LobeType::HAIR_FIBRE) lobe.c1.x = max_f(lobe.c1.x, roughness);
     }
 }
 
@@ -212,6 +227,10 @@ LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 wo) {
         const Lobe& lobe = set.lobes[i];
         if (lobe.type < LobeType::MICROFACET_REFLECTION) {
             add_to_class(value, lobe_class(lobe, lobe.normal), lobe.weight);
+        } else if (is_hair(lobe.type)) {
+            bool fibre = lobe.type == LobeType::HAIR_FIBRE;
+            add_to_class(value, lobe_class(lobe, lobe.normal),
+                         fibre ? lobe.weight * fibre_albedo(lobe, wo) : lobe.weight);
         } else {
             FresnelTerm albedo = lobe_albedo(lobe, wo);
             value.glossy += lobe.weight * albedo.reflected;
@@ -226,8 +245,9 @@ LUCH_FN bool has_smooth_lobe(const ClosureSet& set) {
     for (int i = 0; i < set.count; ++i) {
         const Lobe& lobe = set.lobes[i];
         if (plan::SUBSURFACE && is_subsurface(lobe.type)) continue;  // light is looked for where it comes out
-        if (lobe.type == LobeType::ASHIKHMIN_SHIRLEY ? !is_phong_mirror(lobe)
-                                                     : lobe.type < LobeType::MICROFACET_REFLECTION || !is_mirror(lobe))
+        if (lobe.type == LobeType::ASHIKHMIN_SHIRLEY
+                ? !is_phong_mirror(lobe)
+                : lobe.type < LobeType::MICROFACET_REFLECTION || is_hair(lobe.type) || !is_mirror(lobe))
             return true;
     }
     return false;

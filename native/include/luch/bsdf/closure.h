@@ -26,7 +26,10 @@ enum class LobeType : u8 {
     MICROFACET_REFRACTION,
     MICROFACET_GLASS,         // reflection and refraction in one lobe
     ASHIKHMIN_SHIRLEY,
-    // hair, ray portal: later, each one line here and one header
+    HAIR_FIBRE,               // Principled Hair
+    HAIR_REFLECTION,          // the Hair BSDF node
+    HAIR_TRANSMISSION,
+    // ray portal: later, one line here and one header
 };
 
 // What a lobe counts as for passes, bounces and ray visibility.

@@ -1,5 +1,6 @@
 // The point that a hit names, how far off it may be, and where the next ray starts.
 #pragma once
+#include "luch/geometry/curve.h"
 #include "luch/geometry/ray.h"
 #include "luch/geometry/sphere.h"
 #include "luch/math/bounds.h"
@@ -11,8 +12,9 @@ namespace luch {
 // p is within error, axis by axis, of the surface as any later ray will meet it (math/bounds.h, 2).
 struct SurfacePoint {
     Vec3 p, error;  // world
-    Vec3 outward;   // of a sphere: its unit normal, away from the inside; zero: a triangle
-    Vec3 radial;    // of a sphere: unit, from the centre to p. An instance may stretch it: then they differ
+    Vec3 outward;   // of a sphere or curve: its unit normal, away from the inside; zero: a triangle
+    Vec3 radial;    // of these: unit, from the centre to p, the normal that is shaded. An instance may stretch them:
+                    // then the two differ
 };
 
 LUCH_FN Vec3 transform_magnitude(const Affine& a, Vec3 magnitude) {
@@ -71,11 +73,67 @@ LUCH_FN SurfacePoint sphere_point(const Sphere& sphere, const Ray& ray, const Af
     return point;
 }
 
+// Across a round curve's axis at `center`, unit, to where a ray enters the cylinder that the curve is there; in double for
+// the reason of entered_at. met: where the ray is at the hit, relative to the centre, for when it runs along the axis.
+LUCH_FN Vec3 entered_cylinder_at(Vec3 center, Vec3 tangent, float radius, Vec3 origin, Vec3 direction, Vec3 met) {
+    double ax = double(tangent.x), ay = double(tangent.y), az = double(tangent.z);
+    double inverse = 1 / (ax * ax + ay * ay + az * az);
+    double dx = double(direction.x), dy = double(direction.y), dz = double(direction.z);
+    double fx = double(origin.x) - double(center.x), fy = double(origin.y) - double(center.y),
+           fz = double(origin.z) - double(center.z);
+    double d_along = (dx * ax + dy * ay + dz * az) * inverse, f_along = (fx * ax + fy * ay + fz * az) * inverse;
+    dx -= d_along * ax, dy -= d_along * ay, dz -= d_along * az;  // across the axis
+    fx -= f_along * ax, fy -= f_along * ay, fz -= f_along * az;
+    double a = dx * dx + dy * dy + dz * dz, r = double(radius), s = -(fx * dx + fy * dy + fz * dz) / a;
+    double px = fx + s * dx, py = fy + s * dy, pz = fz + s * dz;
+    double inside = r * r - (px * px + py * py + pz * pz), back = inside > 0 ? root_of(inside / a) : 0;
+    Vec3 n = {float((px - back * dx) / r), float((py - back * dy) / r), float((pz - back * dz) / r)};
+    return normalize_or(n, normalize_or(met, -normalize(direction)));
+}
+
+// A point on a curve's piece. The normal that is shaded is that of the round curve, on a ribbon too.
+LUCH_FN_SLOW SurfacePoint curve_point(const CurveSet& curves, u32 piece, const Hit& hit, const Ray& ray,
+                                      const Affine& to_world, const Affine& to_object) {
+    CurveSegment s = segment_of_piece(curves, piece);
+    Vec3 origin = transform_point(to_object, ray.origin), direction = transform_direction(to_object, ray.direction);
+    double t = double(hit.t);
+    Vec3 p = {float(double(origin.x) + t * double(direction.x)), float(double(origin.y) + t * double(direction.y)),
+              float(double(origin.z) + t * double(direction.z))};
+    Vec3 tangent = curve_tangent(s, curves.shape, hit.u), n;
+    Vec3 error = gamma_f(2) * abs_v(p);
+    float extent = length(s.k[2].p - s.k[1].p);
+    if (curves.shape == CurveShape::RIBBON) {
+        // Its v is the sine of the round curve's normal against the ray (geometry/curve_test.h).
+        Vec3 unit = normalize_or(tangent, {1.0f, 0.0f, 0.0f});
+        Vec3 across = normalize_or(cross(unit, -direction), make_vec3(0.0f));
+        n = normalize_or(across * hit.v + cross(across, unit) * safe_sqrt(1.0f - sqr(hit.v)), -normalize(direction));
+    } else {
+        bool cubic = curves.shape == CurveShape::THICK;
+        CurveWeights w = curve_weights(hit.u);
+        Vec3 center = cubic ? place_of(s, w) : s.k[1].p + (s.k[2].p - s.k[1].p) * hit.u;
+        float radius = cubic ? radius_of(s, w) : length(p - center);
+        n = cubic ? entered_cylinder_at(center, tangent, radius, origin, direction, p - center)
+                  : normalize_or(p - center, -normalize(direction));
+        error += make_vec3(THICK_TOLERANCE * radius + gamma_f(32) * extent) + gamma_f(16) * abs_v(center);
+        if (cubic)
+            p = center + n * radius;
+        else
+            error += gamma_f(4) * abs_f(hit.t) * abs_v(direction);
+    }
+    SurfacePoint point = instance_point(p, error, extent, to_world, to_object);
+    point.radial = normalize_or(transform_direction_transposed(to_object, n), n);
+    point.outward = curves.shape == CurveShape::RIBBON ? -normalize(ray.direction) : point.radial;
+    return point;
+}
+
 // ray: the one that found the hit, world; time: that it was traced at.
 LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit, const Ray& ray, float time) {
     InstanceView moved;
     const InstanceView& instance = instance_at_time(scene, hit.instance, time, &moved);
     const MeshView& mesh = scene.meshes[instance.mesh];
+    if (is_curve(mesh, hit.prim))
+        return curve_point(curves_of(scene, mesh), hit.prim - first_piece(mesh), hit, ray, instance.to_world,
+                           instance.to_object);
     if (is_sphere(mesh, hit.prim)) {
         const float* s = sphere_at(scene, mesh, hit.prim);
         return sphere_point({{s[0], s[1], s[2]}, s[3]}, ray, instance.to_world, instance.to_object);

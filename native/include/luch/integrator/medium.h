@@ -98,7 +98,7 @@ LUCH_FN Color transmitted_length(Color extinction, float distance) {
 LUCH_FN Vec3 border_normal(const SceneView& scene, const Hit& hit, const SurfacePoint& spot, float time) {
     InstanceView moved;
     const InstanceView& instance = instance_at_time(scene, hit.instance, time, &moved);
-    if (is_sphere(scene.meshes[instance.mesh], hit.prim)) return spot.outward;
+    if (!is_triangle(scene.meshes[instance.mesh], hit.prim)) return spot.outward;
     return world_face_normal(instance, triangle_at(scene, instance, hit.prim, time));
 }
 
@@ -121,11 +121,11 @@ LUCH_FN void leave_medium(MediumStack& stack, u32 instance, u32 medium) {
     }
 }
 
-// A ray goes through a surface. from_behind: it came from the side that the medium is on. Spheres hold none: their
+// A ray goes through a surface. from_behind: it came from the side that the medium is on. Spheres and hair hold none: their
 // inside is not there for rays.
 LUCH_FN void cross_border(const SceneView& scene, MediumStack& stack, u32 instance, u32 prim, bool from_behind) {
     u32 medium = scene.materials[material_at(scene, instance, prim)].medium;
-    if (medium == NONE || is_sphere(scene.meshes[scene.instances[instance].mesh], prim)) return;
+    if (medium == NONE || !is_triangle(scene.meshes[scene.instances[instance].mesh], prim)) return;
     if (from_behind)
         leave_medium(stack, instance, medium);
     else

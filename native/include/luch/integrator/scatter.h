@@ -103,7 +103,8 @@ LUCH_FN bool set_transmits(const ClosureSet& set) {
     for (int i = 0; i < set.count; i++) {
         const Lobe& lobe = set.lobes[i];
         if (lobe.type == LobeType::TRANSLUCENT || lobe.type == LobeType::MICROFACET_REFRACTION ||
-            lobe.type == LobeType::MICROFACET_GLASS || (lobe.flags & LOBE_MIRRORED)) {
+            lobe.type == LobeType::MICROFACET_GLASS || lobe.type == LobeType::HAIR_FIBRE ||
+            lobe.type == LobeType::HAIR_TRANSMISSION || (lobe.flags & LOBE_MIRRORED)) {
             return true;
         }
     }

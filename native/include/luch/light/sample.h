@@ -235,8 +235,8 @@ LUCH_FN_SLOW float pdf_triangle(const SceneView& scene, Vec3 p, Vec3 n, bool tra
                                 Vec3 direction, float distance, float time = SHUTTER_MIDDLE) {
     const LightsView& lights = *scene.lights;
     if (lights.emitter_count == 0u) return 0.0f;
-    // Spheres are met, never chosen.
-    if (is_sphere(scene.meshes[scene.instances[instance].mesh], prim)) return 0.0f;
+    // Spheres and curves are met, never chosen.
+    if (!is_triangle(scene.meshes[scene.instances[instance].mesh], prim)) return 0.0f;
     const InstanceLight& light = lights.instances[instance];
     u32 emitter = light.cluster;
     float share = 1.0f;

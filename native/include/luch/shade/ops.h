@@ -4,6 +4,7 @@
 #include "luch/shade/nodes/closures.h"
 #include "luch/shade/nodes/color.h"
 #include "luch/shade/nodes/curves.h"
+#include "luch/shade/nodes/hair.h"
 #include "luch/shade/nodes/map_range.h"
 #include "luch/shade/nodes/math.h"
 #include "luch/shade/nodes/normals.h"

@@ -1,5 +1,6 @@
 // The scene as kernels see it: plain pointers, filled once by cpu/scene_store (and its CUDA twin).
 #pragma once
+#include "luch/geometry/curve.h"
 #include "luch/geometry/motion.h"
 #include "luch/geometry/ray.h"
 #include "luch/math/vec.h"
@@ -8,7 +9,7 @@
 
 namespace luch {
 
-enum class Domain : u8 { NONE_, POINT, CORNER, FACE, MESH, SPHERE };
+enum class Domain : u8 { NONE_, POINT, CORNER, FACE, MESH, SPHERE, CURVE, CURVE_POINT };
 
 struct AttributeView {
     u32 offset;   // into SceneView::attribute_data, floats
@@ -24,6 +25,9 @@ struct MeshView {
     u32 first_attribute;                 // attributes[first_attribute + attribute id]
     Vec3 texture_location, texture_size;
     u32 first_sphere, sphere_count;      // into spheres; sphere k is primitive triangle_count + k
+    u32 first_curve_point;               // into curve_points
+    u32 first_segment, segment_count;    // into curve_segments; their pieces are the primitives after the spheres
+    u32 first_curve, curve_count;        // into curve_slots
 };
 
 enum InstanceFlag : u32 {
@@ -88,6 +92,10 @@ struct SceneView {
     const u32* triangles;        // 3 per triangle, local vertex indices
     const u16* material_slots;   // per triangle; spheres show the first slot
     const float* spheres;        // 4 per sphere: centre, radius (see Sphere), object space
+    const float* curve_points;   // 4 per point of curves: place, radius, object space
+    const u32* curve_segments;   // as CurveSet's, points counted within the mesh
+    const u32* segment_curves;   // per segment: its curve, counted within the mesh
+    const u16* curve_slots;      // per curve
     const float* normals;
     const float* attribute_data;
     const AttributeView* attributes;
@@ -112,6 +120,8 @@ struct SceneView {
     const CameraView* camera;    // Texture Coordinate > Camera/Window, Camera Data; null: they give 0
     Vec2 frame_size;             // pixels of the full frame: Texture Coordinate > Window
     Vec3 origin;                 // Scene.origin: added to a position it gives Blender's world
+    CurveShape curve_shape;      // of all curves
+    u32 log2_pieces;             // of every segment: see CurveSet
     const MotionView* motion;    // null: nothing moves
 };
 
@@ -128,11 +138,34 @@ LUCH_FN const u32* corners_of(const SceneView& scene, const MeshView& mesh, u32 
     return scene.triangles + 3 * (u64(mesh.first_triangle) + prim);
 }
 
-LUCH_FN u32 primitive_count(const MeshView& mesh) { return mesh.triangle_count + mesh.sphere_count; }
-LUCH_FN bool is_sphere(const MeshView& mesh, u32 prim) { return prim >= mesh.triangle_count; }
+// Without the pieces of curves.
+LUCH_FN u32 first_piece(const MeshView& mesh) { return mesh.triangle_count + mesh.sphere_count; }
+LUCH_FN u32 primitive_count(const SceneView& scene, const MeshView& mesh) {
+    return first_piece(mesh) + (mesh.segment_count << scene.log2_pieces);
+}
+LUCH_FN bool is_triangle(const MeshView& mesh, u32 prim) { return prim < mesh.triangle_count; }
+LUCH_FN bool is_curve(const MeshView& mesh, u32 prim) { return plan::CURVES && prim >= first_piece(mesh); }
+LUCH_FN bool is_sphere(const MeshView& mesh, u32 prim) { return !is_triangle(mesh, prim) && !is_curve(mesh, prim); }
 // Centre and radius of a primitive that is a sphere.
 LUCH_FN const float* sphere_at(const SceneView& scene, const MeshView& mesh, u32 prim) {
     return scene.spheres + 4 * (u64(mesh.first_sphere) + (prim - mesh.triangle_count));
+}
+
+// The mesh's curves, where its primitives are numbered within them.
+LUCH_FN CurveSet curves_of(const SceneView& scene, const MeshView& mesh) {
+    return {scene.curve_points + 4 * u64(mesh.first_curve_point),
+            scene.curve_segments + mesh.first_segment,
+            mesh.segment_count,
+            scene.log2_pieces,
+            scene.curve_shape,
+            0};
+}
+// Of a primitive that is a curve's piece: its segment and its curve, counted within the mesh.
+LUCH_FN u32 segment_of_prim(const SceneView& scene, const MeshView& mesh, u32 prim) {
+    return (prim - first_piece(mesh)) >> scene.log2_pieces;
+}
+LUCH_FN u32 curve_of_prim(const SceneView& scene, const MeshView& mesh, u32 prim) {
+    return scene.segment_curves[mesh.first_segment + segment_of_prim(scene, mesh, prim)];
 }
 
 struct Triangle {
@@ -196,8 +229,13 @@ LUCH_FN u32 material_of_slot(const SceneView& scene, const InstanceView& instanc
 LUCH_FN u32 material_at(const SceneView& scene, u32 instance_index, u32 prim) {
     const InstanceView& instance = scene.instances[instance_index];
     const MeshView& mesh = scene.meshes[instance.mesh];
-    return material_of_slot(scene, instance,
-                            is_sphere(mesh, prim) ? 0u : scene.material_slots[mesh.first_triangle + prim]);
+    u32 slot = 0;
+    if (is_triangle(mesh, prim)) {
+        slot = scene.material_slots[mesh.first_triangle + prim];
+    } else if (is_curve(mesh, prim)) {
+        slot = scene.curve_slots[mesh.first_curve + curve_of_prim(scene, mesh, prim)];
+    }
+    return material_of_slot(scene, instance, slot);
 }
 
 LUCH_FN const float* table_of(const OpContext& c, u32 offset) {

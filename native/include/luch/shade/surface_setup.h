@@ -51,7 +51,7 @@ LUCH_FN SmoothSurface smooth_surface(const SceneView& scene, const MeshView& mes
 
 struct LaneInputs {
     Vec3 point, to_viewer;  // world; to_viewer unit
-    Vec3 radial;            // of a point on a sphere: SurfacePoint::radial, its normal as shaders see it
+    Vec3 radial;            // of a point on a sphere or curve: SurfacePoint::radial, its normal as shaders see it
     u32 instance, prim;
     float u, v;
     float ray_length, footprint;
@@ -59,19 +59,22 @@ struct LaneInputs {
     float time;
 };
 
-// Fills lane `lane` for a point on a triangle or sphere. Normals are turned to the viewer's side and
+// Fills lane `lane` for a point on a triangle, sphere or curve. Normals are turned to the viewer's side and
 // PATH_BACKFACING is set when that turned them.
 LUCH_FN void setup_surface_lane(const SceneView& scene, const LaneInputs& in, ShadePoints& points, int lane) {
     InstanceView moved;
     const InstanceView& instance = instance_at_time(scene, in.instance, in.time, &moved);
     const MeshView& mesh = scene.meshes[instance.mesh];
-    bool round = is_sphere(mesh, in.prim);
+    bool round = !is_triangle(mesh, in.prim);
     Triangle t{};
     if (!round) t = triangle_at(scene, instance, in.prim, in.time);
     Vec3 ng = round ? in.radial : world_face_normal(instance, t);
+    // A ribbon is turned to the ray, and only shaded as if it were round.
+    bool ribbon = is_curve(mesh, in.prim) && scene.curve_shape == CurveShape::RIBBON;
+    if (ribbon) ng = in.to_viewer;
     bool back = dot(ng, in.to_viewer) < 0.0f;
     if (back) ng = -ng;
-    SmoothSurface smooth = {ng, 0.0f, 0.0f};
+    SmoothSurface smooth = {ribbon ? in.radial : ng, 0.0f, 0.0f};
     if (!round && mesh.normals_domain != Domain::NONE_)
         smooth = smooth_surface(scene, mesh, instance, in.prim, t, in.u, in.v, in.time, back ? -1.0f : 1.0f, ng);
     Vec3 n = smooth.normal;

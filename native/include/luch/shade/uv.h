@@ -8,7 +8,7 @@ LUCH_FN Vec3 surface_uv(const SceneView& scene, const ShadePoints& points, int l
     const MeshView& mesh = scene.meshes[scene.instances[points.instance[lane]].mesh];
     const AttributeView& map = scene.attributes[mesh.first_attribute + scene.uv_attribute];
     u32 prim = points.prim[lane];
-    if (map.channels < 2 || is_sphere(mesh, prim)) return {0.0f, 0.0f, 0.0f};
+    if (map.channels < 2 || !is_triangle(mesh, prim)) return {0.0f, 0.0f, 0.0f};
     u32 row[3] = {prim * 3, prim * 3 + 1, prim * 3 + 2};
     if (map.domain == Domain::POINT) {
         const u32* t = corners_of(scene, mesh, prim);

@@ -55,7 +55,7 @@ LUCH_FN Vec2 barycentrics_at(const OpContext& c, const u32* params) {
     InstanceView moved;
     const InstanceView& instance = instance_at_time(*c.scene, c.points->instance[c.lane], time_at(c), &moved);
     const MeshView& mesh = c.scene->meshes[instance.mesh];
-    if (is_sphere(mesh, c.points->prim[c.lane])) return uv;
+    if (!is_triangle(mesh, c.points->prim[c.lane])) return uv;
     Triangle t = triangle_at(*c.scene, instance, c.points->prim[c.lane], time_at(c));
     Vec3 edge_u = transform_direction(instance.to_world, t.p[1] - t.p[0]);
     Vec3 edge_v = transform_direction(instance.to_world, t.p[2] - t.p[0]);
@@ -80,9 +80,19 @@ LUCH_FN AttributeValue read_attribute(const OpContext& c, u32 attribute, const u
     if (view.channels == 0) return result;
     const float* data = scene.attribute_data + view.offset;
     const u32 prim = c.points->prim[c.lane], n = view.channels;
-    const bool sphere = is_sphere(mesh, prim);
-    if (view.domain != Domain::MESH && sphere != (view.domain == Domain::SPHERE)) {
+    const bool sphere = is_sphere(mesh, prim), curve = is_curve(mesh, prim);
+    const bool of_curves = view.domain == Domain::CURVE || view.domain == Domain::CURVE_POINT;
+    if (view.domain != Domain::MESH && (sphere != (view.domain == Domain::SPHERE) || curve != of_curves)) {
         result.channels = 0;  // the attribute is the mesh's other primitives'
+        return result;
+    }
+    if (curve && of_curves) {
+        const bool of_points = view.domain == Domain::CURVE_POINT;
+        const u32 segment = mesh.first_segment + segment_of_prim(scene, mesh, prim);
+        const u32 row = of_points ? scene.curve_segments[segment] >> 2 : scene.segment_curves[segment];
+        const float* from = data + u64(row) * n;
+        const float share = c.points->u[c.lane];
+        for (u32 k = 0; k < n; k++) result.value[k] = of_points ? mix_f(from[k], from[n + k], share) : from[k];
         return result;
     }
     if (sphere || view.domain == Domain::FACE || view.domain == Domain::MESH) {

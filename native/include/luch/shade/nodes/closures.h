@@ -202,7 +202,8 @@ struct OpClosurePrincipled {
 LUCH_FN float smallest_walk_radius(const OpContext& c) {
     u32 instance = c.points->instance[c.lane];
     if (instance == NONE) return INFINITE_DISTANCE;
-    if (is_sphere(c.scene->meshes[c.scene->instances[instance].mesh], c.points->prim[c.lane])) return INFINITE_DISTANCE;
+    if (!is_triangle(c.scene->meshes[c.scene->instances[instance].mesh], c.points->prim[c.lane]))
+        return INFINITE_DISTANCE;
     return SUBSURFACE_MIN_ULP * EPS * max_component(abs_v(position_at(c)));
 }
 

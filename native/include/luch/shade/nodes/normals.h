@@ -109,7 +109,7 @@ LUCH_FN Vec3 mesh_normal(const OpContext& c, const InstanceView& instance) {
     const bool back = (c.points->flags[c.lane] & PATH_BACKFACING) != 0;
     Vec3 flat = geometric_normal_at(c) * (back ? -1.0f : 1.0f);
     flat = normal_to_object(&instance, flat);
-    if (mesh.normals_domain == Domain::NONE_ || is_sphere(mesh, prim)) return flat;
+    if (mesh.normals_domain == Domain::NONE_ || !is_triangle(mesh, prim)) return flat;
     const u32* vertex = corners_of(scene, mesh, prim);
     float u = c.points->u[c.lane], v = c.points->v[c.lane], weight[3] = {1.0f - u - v, u, v};
     Vec3 n = make_vec3(0.0f);

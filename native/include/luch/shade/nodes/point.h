@@ -235,7 +235,7 @@ struct OpWireframe {
         const InstanceView* instance = placed_at(c, &moved);
         if (!instance) return;
         const MeshView& mesh = c.scene->meshes[instance->mesh];
-        if (is_sphere(mesh, c.points->prim[c.lane])) return;
+        if (!is_triangle(mesh, c.points->prim[c.lane])) return;
         Triangle t = triangle_at(*c.scene, *instance, c.points->prim[c.lane], time_at(c));
         float width = 1.0f;
         if (params[2] != 0) {  // seen across the ray
