@@ -52,6 +52,13 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--output", help="PATH.exr (multilayer) or PATH.png (default: both, under out/)")
     render.add_argument("--engine", default="LUCH", choices=["LUCH", "CYCLES"], help="for a look beside (default LUCH)")
 
+    report = add("report", "Report what accuracy costs in a scene: error against time, the price of each effect.")
+    report.add_argument("file", nargs="?", help="a .blend file (default: the demo scene, built by its script)")
+    report.add_argument("--seconds", type=float, default=60.0, help="how long it may take (default: 60)")
+    report.add_argument("--size", type=int, default=0, help="pixels along the longer side (default: as time allows)")
+    report.add_argument("--frame", type=int, help="frame to report on (default: the file's current one)")
+    report.add_argument("-o", "--output", help="folder for the report (default: out/report/NAME)")
+
     export = add("export", "Write a .blend file as a .luch scene, which renders without Blender.")
     export.add_argument("file", help="a .blend file")
     export.add_argument("-o", "--output", required=True, help="PATH.luch")

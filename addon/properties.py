@@ -109,6 +109,14 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         default=False,
         description="Render in two halves with other noise, and hold the claimed error against their difference",
     )
+    report_seconds: FloatProperty(
+        name="Report Time", default=60.0, min=1.0, soft_max=3600.0, unit="TIME_ABSOLUTE",
+        description="How long a report on what accuracy costs may take",
+    )  # fmt: skip
+    report_folder: StringProperty(
+        name="Report Folder", default="//luch_report", subtype="DIR_PATH",
+        description="Where reports go, each into a folder of its own; without a saved file, Blender's temporary folder",
+    )  # fmt: skip
     seed: IntProperty(name="Seed", default=0, min=0, description="Chooses the noise; the picture stays the same")
     use_animated_seed: BoolProperty(
         name="Use Animated Seed", default=False, description="Another noise in every frame of an animation"

@@ -51,6 +51,15 @@ def render(arguments: Arguments) -> int:
     )
 
 
+def report(arguments: Arguments) -> int:
+    if arguments.file is not None:
+        _require_file(arguments.file)
+    if not arguments.seconds > 0:
+        raise BuildFailure(f"--seconds {arguments.seconds:g}: a report needs time")
+    _prepare(arguments)
+    return _inside_blender("report", arguments, ["file", "seconds", "size", "frame", "output"])
+
+
 def export(arguments: Arguments) -> int:
     _require_file(arguments.file)
     _prepare(arguments)

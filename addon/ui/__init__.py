@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import accuracy, datablocks, effects, motion, operators, panels, stock
+from . import accuracy, datablocks, effects, motion, operators, panels, report, stock
 
 
 def register() -> None:
@@ -10,6 +10,7 @@ def register() -> None:
     stock.register()
     panels.register()
     accuracy.register()
+    report.register()
     motion.register()
     effects.register()
     datablocks.register()
@@ -18,6 +19,7 @@ def register() -> None:
 def unregister() -> None:
     datablocks.unregister()
     effects.unregister()
+    report.unregister()
     accuracy.unregister()
     motion.unregister()
     panels.unregister()

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from buildtools.inside import session
-from buildtools.places import OUT, ROOT
+from buildtools.places import OUT
 
 DEMO_SAMPLES = 64
 
@@ -18,7 +18,7 @@ DEMO_SAMPLES = 64
 def main(options: dict[str, Any]) -> int:
     source = options["file"]
     if source is None:
-        _build_demo()
+        session.build_demo()
         options["samples"] = options["samples"] or DEMO_SAMPLES
     scene = session.open_file(source, options["engine"])
     if options["frame"] is not None:
@@ -41,13 +41,6 @@ def main(options: dict[str, Any]) -> int:
     for path in [*asked, report]:
         print(f"  {path}")
     return 0
-
-
-def _build_demo() -> None:
-    sys.path.insert(0, str(ROOT / "tests"))
-    from scenes import demo
-
-    demo.build()
 
 
 def _statistics(engine: str, scene: bpy.types.Scene, render: session.Render) -> dict[str, Any]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+
+from buildtools.places import ROOT
 
 
 @dataclass
@@ -33,6 +36,14 @@ def open_file(path: str | None, engine: str = "LUCH") -> bpy.types.Scene:
     if engine == "CYCLES":
         scene.cycles.device = "CPU"
     return scene
+
+
+def build_demo() -> None:
+    """The repository's own scene, by its script, into the file that is open."""
+    sys.path.insert(0, str(ROOT / "tests"))
+    from scenes import demo
+
+    demo.build()
 
 
 def choose_samples(

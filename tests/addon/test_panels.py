@@ -142,8 +142,8 @@ def test_a_curve_is_drawn_where_its_points_are() -> None:
     x, y = plot.axes(points, 0.01, 64.0)
     assert picture.shape == (plot.HEIGHT, plot.WIDTH, 4)
     for seconds, error, _, _ in points:
-        assert picture[y.at(error), x.at(seconds), :3] == pytest.approx(plot.DOT)
-    assert picture[y.at(0.01), x.at(64.0), :3] == pytest.approx(plot.AIM)
+        assert picture[round(y.at(error)), round(x.at(seconds)), :3] == pytest.approx(plot.DOT)
+    assert picture[round(y.at(0.01)), round(x.at(64.0)), :3] == pytest.approx(plot.AIM)
     assert x.at(1.0) < x.at(4.0) < x.at(64.0) and y.at(0.02) < y.at(0.08), "less error lies lower"
     for odd in ([], [(0.0, 0.0, 0.0, 0.0)], points[:1]):
         assert np.isfinite(plot.draw_curve(odd)).all()
