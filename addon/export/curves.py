@@ -25,21 +25,27 @@ def export_curves(data: Any, wanted: set[str], context: ExportContext) -> Mesh |
 
     wanted: what its materials read (see attributes.wishes).
     """
-    count = len(data.points)
-    if count == 0:
+    if len(data.points) == 0:
         return None
-    points = np.empty((count, 4), np.float32)
-    points[:, :3] = read(data.attributes["position"].data, "vector", 3 * count, np.float32).reshape(-1, 3)
-    points[:, 3] = _radii(data, count, context)
+    points = read_points(data, context)
     offsets = np.empty(len(data.curves) + 1, np.int32)
     data.curve_offset_data.foreach_get("value", offsets)
-    _shrink_invalid(points, data.name, context)
-    slots = np.zeros(len(data.curves), np.uint16)
+    slots = np.zeros(len(data.curves), np.uint16)  # Blender has no slots of single curves, particle systems have
     result = mesh_of(data.name, Curves(points, offsets[:-1].astype(np.uint32), slots))
     result.attributes = _attributes(data, wanted, context) | derived(result, wanted)
     if SURFACE_UV in result.attributes:
         result.uv_active = SURFACE_UV
     return result
+
+
+def read_points(data: Any, context: ExportContext) -> F32:
+    """Place and radius of every point, (P, 4); those that are not finite have none and are named."""
+    count = len(data.points)
+    points = np.empty((count, 4), np.float32)
+    points[:, :3] = read(data.attributes["position"].data, "vector", 3 * count, np.float32).reshape(-1, 3)
+    points[:, 3] = _radii(data, count, context)
+    _shrink_invalid(points, data.name, context)
+    return points
 
 
 def mesh_of(name: str, curves: Curves) -> Mesh:

@@ -139,15 +139,15 @@ class InstanceCollector:
         key = (subject.data.as_pointer(), source.as_pointer(), parent.as_pointer())
         if key not in self._hair:
             self._hair[key] = [self._add_object(subject, parent, system) for system in systems]
-        for index in self._hair[key]:
-            self._add_row(item, subject, parent, index)
+        for index, (modifier, _) in zip(self._hair[key], systems, strict=True):
+            self._add_row(item, subject, parent, index, modifier.name)
 
-    def _add_row(self, item: Any, subject: Any, parent: Any, index: int) -> None:
+    def _add_row(self, item: Any, subject: Any, parent: Any, index: int, modifier: str = "") -> None:
         if index == NO_OBJECT:
             return
         if self._recorder is not None:
             mesh = self._context.result.objects[index].mesh
-            self._recorder.note(item, subject, parent, len(self._object_column), mesh)
+            self._recorder.note(item, subject, parent, len(self._object_column), mesh, modifier)
         is_instance = item.is_instance
         self._object_column.append(index)
         # Vectors of the iterator point into it: only copies may be kept.

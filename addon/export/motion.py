@@ -12,6 +12,7 @@ import numpy as np
 from luch.scene import F32, F64, Camera, CameraMotion, InstanceMotion, Mesh, Shutter
 
 from .context import ExportContext
+from .hair_motion import HairShape, read_hair, tell_hair
 from .shapes import MeshTopology, export_shape, read_velocity
 
 CURVE_POINTS = 256  # of the shutter's curve, evenly spaced
@@ -102,20 +103,24 @@ class MotionRecorder:
         ] = {}  # instance -> rows of the exporter's columns: itself, its hair
         self._keys: list[int] = []  # by row
         self._mesh_of: list[int] = []  # by row, index into Scene.meshes
-        self._shapes: dict[int, _Shape] = {}  # by index into Scene.meshes
+        self._shapes: dict[int, _Shape | HairShape] = {}  # by index into Scene.meshes
         self._matrices: dict[int, dict[float, bytes]] = {}  # of a row, by time
         self._still: dict[str, None] = {}
 
-    def note(self, item: Any, subject: Any, parent: Any, row: int, mesh: int) -> None:
-        """An instance that was exported. row: its place among all; mesh: index into Scene.meshes."""
+    def note(self, item: Any, subject: Any, parent: Any, row: int, mesh: int, modifier: str = "") -> None:
+        """An instance that was exported. row: its place among all; mesh: index into Scene.meshes; modifier: the name of
+        that which grows it, where it is particle hair."""
         keys = motion_keys(subject, parent)
         self._rows.setdefault(_identity(item), []).append(row)
         self._keys.append(keys)
         self._mesh_of.append(mesh)
         if not keys:
             self._still[f'object "{subject.name}": its Motion Blur is disabled'] = None
-        elif mesh not in self._shapes and subject.type == "MESH" and _may_deform(subject, parent):
-            self._note_shape(subject, keys, mesh)
+        elif mesh not in self._shapes and _may_deform(subject, parent):
+            if self._context.result.meshes[mesh].curves is not None:
+                self._shapes[mesh] = HairShape(subject.name, keys, modifier)
+            elif subject.type == "MESH":
+                self._note_shape(subject, keys, mesh)
 
     def _note_shape(self, subject: Any, keys: int, mesh: int) -> None:
         result = self._context.result.meshes[mesh]
@@ -187,9 +192,24 @@ class MotionRecorder:
                     self._matrices.setdefault(row, {})[time] = bytes(item.matrix_world)
                 mesh = self._mesh_of[row]
                 shape = self._shapes.get(mesh)
-                if shape and mesh not in read and time in _times(shape.keys) and time not in shape.positions:
-                    read.add(mesh)
+                if shape is None or mesh in read or time not in _times(shape.keys):
+                    continue
+                read.add(mesh)
+                if isinstance(shape, HairShape):
+                    self._read_hair(mesh, shape, item.object, time)
+                elif time not in shape.positions:
                     self._read_shape(mesh, shape, item.object.data, time)
+
+    def _read_hair(self, mesh: int, shape: HairShape, subject: Any, time: float) -> None:
+        points, curves = read_hair(subject, shape, self._context), self._context.result.meshes[mesh].curves
+        if points is None or curves is None or points.shape != curves.points.shape:
+            self._context.warn(
+                f'Object "{shape.owner}": its hair has other curves or points at other times of this frame, so its'
+                " change of shape is not blurred. Keep their number."
+            )
+            del self._shapes[mesh]
+            return
+        shape.points[time] = points
 
     def _read_shape(self, mesh: int, shape: _Shape, data: Any, time: float) -> None:
         found = export_shape(data, shape.topology, self._context.result.meshes[mesh])
@@ -210,7 +230,12 @@ class MotionRecorder:
         self.shutter.still = list(self._still)
         result.shutter = self.shutter
         for index, shape in self._shapes.items():
-            _tell_shape(result.meshes[index], shape)
+            mesh = result.meshes[index]
+            if isinstance(shape, HairShape):
+                if mesh.curves is not None:
+                    tell_hair(mesh.curves, shape, _times(shape.keys))
+            else:
+                _tell_shape(mesh, shape)
         if result.instances is None:
             return
         place = np.cumsum(kept) - 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from luch.scene import F32, Attribute, Curves, Mesh
 from .attributes import ACTIVE_COLOR
 from .context import ExportContext
 from .curves import NOT_FOR_SHADERS, derived, mesh_of
+
+_STRAYS = 16.0  # units in the last place of a path's coordinates, through Blender's transforms and back
 
 
 def hair_systems(subject: Any) -> list[tuple[Any, Any]]:
@@ -24,8 +27,18 @@ def hair_systems(subject: Any) -> list[tuple[Any, Any]]:
     ]
 
 
-def export_hair(subject: Any, modifier: Any, system: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
-    """Curves of one system; None if it has none."""
+@dataclass
+class Grown:
+    """The paths of a system that were computed, in the object's space."""
+
+    numbers: list[int]  # as Blender counts a system's particles and children
+    points: F32  # (len(numbers) * steps, 4) place and radius, path by path
+    steps: int
+    noise: float  # how far a place may stray: Blender tells it in the world, in single precision
+
+
+def grow(subject: Any, system: Any) -> Grown | None:
+    """Every path of an evaluated system, or of its children where it has those; None if there is none."""
     settings = system.settings
     parents, children = len(system.particles), len(system.child_particles)
     start = 0 if children == 0 or settings.child_type == "NONE" else parents
@@ -47,11 +60,22 @@ def export_hair(subject: Any, modifier: Any, system: Any, wanted: set[str], cont
     arc = np.concatenate([np.zeros((len(place), 1)), np.cumsum(lengths, axis=1)], axis=1)
     along = arc / arc[:, -1:]
     points = np.concatenate([place, _radii(settings, along)[..., None]], axis=2).astype(np.float32)
-    first = np.arange(len(place), dtype=np.uint32) * np.uint32(steps)
-    slots = np.full(len(place), max(settings.material - 1, 0), np.uint16)
-    mesh = mesh_of(f"{subject.name} {system.name}", Curves(points.reshape(-1, 4), first, slots))
+    far = np.abs(world.reshape(len(numbers), -1)[there]).max()
+    noise = float(_STRAYS * np.finfo(np.float32).eps * far * np.abs(to_object[:3, :3]).sum(1).max())
+    return Grown([n for n, t in zip(numbers, there, strict=True) if t], points.reshape(-1, 4), steps, noise)
+
+
+def export_hair(subject: Any, modifier: Any, system: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
+    """Curves of one system; None if it has none."""
+    grown = grow(subject, system)
+    if grown is None:
+        return None
+    count = len(grown.numbers)
+    first = np.arange(count, dtype=np.uint32) * np.uint32(grown.steps)
+    slots = np.full(count, max(system.settings.material - 1, 0), np.uint16)
+    mesh = mesh_of(f"{subject.name} {system.name}", Curves(grown.points, first, slots))
     mesh.attributes = derived(mesh, wanted)
-    _add_emitter_values(mesh, subject, modifier, system, [n for n, t in zip(numbers, there, strict=True) if t], wanted)
+    _add_emitter_values(mesh, subject, modifier, system, grown.numbers, wanted)
     return mesh
 
 

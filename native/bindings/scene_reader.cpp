@@ -105,7 +105,7 @@ struct Reader {
         return store.add_program(source);
     }
 
-    static cpu::CurveInput read_curves(const std::string& name, const py::object& curves, Keep& keep) {
+    cpu::CurveInput read_curves(const std::string& name, const py::object& curves, Keep& keep) {
         auto points = keep.array<float>(curves.attr("points"));
         auto first = keep.array<u32>(curves.attr("first"));
         auto slots = keep.array<u16>(curves.attr("material_slots"));
@@ -114,7 +114,16 @@ struct Reader {
             throw std::invalid_argument("Mesh \"" + name +
                                         "\": curves need points (P, 4), place and radius, first (C,) " +
                                         "and material_slots (C,).");
-        return {points.data(), size_t(points.shape(0)), first.data(), slots.data(), size_t(first.shape(0))};
+        cpu::CurveInput in = {
+            points.data(), size_t(points.shape(0)), first.data(), slots.data(), size_t(first.shape(0)), 0, nullptr};
+        if (still() || curves.attr("motion_points").is_none()) return in;
+        auto moved = keep.array<float>(curves.attr("motion_points"));
+        if (moved.ndim() != 3 || moved.shape(0) < 2 || moved.shape(1) != points.shape(0) || moved.shape(2) != 4)
+            throw std::invalid_argument("Mesh \"" + name + "\": motion_points of its curves must be (K, P, 4), " +
+                                        "K at least 2.");
+        in.motion_keys = u32(moved.shape(0));
+        in.motion_points = moved.data();
+        return in;
     }
 
     void read_mesh(const py::object& mesh) {

@@ -1,6 +1,5 @@
 #include "cpu/curve_store.h"
 
-#include <cmath>
 #include <stdexcept>
 
 namespace luch::cpu {
@@ -18,15 +17,16 @@ void check(const std::string& name, const CurveInput& in) {
         size_t end = c + 1 < in.curve_count ? in.first[c + 1] : in.point_count;
         if (in.first[c] > end || end > in.point_count) refuse("curve " + std::to_string(c) + " ends before it begins");
     }
-    for (size_t i = 0; i < in.point_count; ++i) {
-        const float* p = in.points + 4 * i;
-        if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]) && std::isfinite(p[3]) && p[3] >= 0.0f)
-            continue;
-        refuse("point " + std::to_string(i) + " of its curves needs a finite place and a finite radius, not below 0");
-    }
 }
 
 }  // namespace
+
+void add_curve_points(std::vector<float>& to, const float* points, size_t count) {
+    size_t first = to.size();
+    to.insert(to.end(), points, points + 4 * count);
+    for (size_t i = first + 3; i < to.size(); i += 4)
+        if (to[i] < 0.0f) to[i] = 0.0f;  // what is not finite stays: builders leave it out
+}
 
 void CurveStore::add(const std::string& mesh_name, const CurveInput& in, MeshView& mesh) {
     check(mesh_name, in);
@@ -34,7 +34,7 @@ void CurveStore::add(const std::string& mesh_name, const CurveInput& in, MeshVie
     mesh.first_segment = u32(segments_.size());
     mesh.first_curve = u32(slots_.size());
     mesh.curve_count = u32(in.curve_count);
-    points_.insert(points_.end(), in.points, in.points + 4 * in.point_count);
+    add_curve_points(points_, in.points, in.point_count);
     slots_.insert(slots_.end(), in.slots, in.slots + in.curve_count);
     for (u32 c = 0; c < in.curve_count; ++c) {
         u32 first = in.first[c], end = c + 1 < in.curve_count ? in.first[c + 1] : u32(in.point_count);

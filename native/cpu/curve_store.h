@@ -14,7 +14,12 @@ struct CurveInput {
     const u32* first = nullptr;     // of each curve its first point, ascending; it ends where the next begins
     const u16* slots = nullptr;     // of each curve
     size_t curve_count = 0;
+    u32 motion_keys = 0;  // 0: they keep their shape
+    const float* motion_points = nullptr;  // as points, key by key
 };
+
+// Appends points; a radius below 0 is none.
+void add_curve_points(std::vector<float>& to, const float* points, size_t count);
 
 class CurveStore {
  public:

@@ -168,6 +168,8 @@ void SceneStore::add_mesh(const MeshInput& input) {
         if (attribute.name == input.color_active) named_attributes_.push_back({index, view_.color_attribute, view});
     }
     meshes_.push_back(mesh);
+    if (input.curves.motion_keys > 1 && mesh.segment_count > 0)
+        motion_.add_curves(index, u32(input.curves.point_count), input.curves.motion_keys, input.curves.motion_points);
     if (input.motion_keys > 1)
         motion_.add_mesh(index, mesh.vertex_count, u32(input.normals ? rows_of(input.normals_domain, input) : 0),
                          input.motion_keys, input.motion_positions, input.normals ? input.motion_normals : nullptr);

@@ -38,6 +38,7 @@ class Curves:
     points: F32  # (P, 4) place and radius in object space
     first: U32  # (C,) first point of each curve, ascending from 0; it ends where the next begins. One point: not drawn
     material_slots: NDArray[np.uint16]  # (C,)
+    motion_points: F32 | None = None  # (K, P, 4) while the shutter is open, as Mesh.motion_positions
 
 
 @dataclass

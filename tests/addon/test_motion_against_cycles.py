@@ -232,15 +232,8 @@ def across(material: Any) -> None:
     links.new(nodes.new("ShaderNodeHairInfo").outputs["Tangent Normal"], nodes["Emission"].inputs["Color"])
 
 
-def test_hair_curves_move_with_their_object_as_in_cycles(stage: Any, render: Callable[..., Any]) -> None:
-    subject = fur(stage)
-    stage.cycles_curves.subdivisions = 4  # see test_hair_against_cycles.py
-    animate(subject, "location", (-0.8, 0.0, 0.0), (0.8, 0.3, 0.2))
-    animate(subject, "rotation_euler", (0.2, 0.0, -0.7), (0.0, 0.3, 0.7))
-    check(render)
-
-
-def test_particle_hair_moves_with_its_emitter_as_in_cycles(stage: Any, render: Callable[..., Any]) -> None:
+def particle_hair() -> Any:
+    """A plane that is not seen, and what grows on it."""
     bpy.ops.mesh.primitive_plane_add(size=2.0)
     emitter = bpy.context.object
     emitter.data.materials.append(glowing("Fur", (1.0, 1.0, 1.0)))
@@ -250,5 +243,52 @@ def test_particle_hair_moves_with_its_emitter_as_in_cycles(stage: Any, render: C
     settings.type, settings.count, settings.hair_length, settings.radius_scale = "HAIR", 12, 1.5, 0.2
     emitter.rotation_euler = (1.2, 0.0, 0.0)
     emitter.show_instancer_for_render = False
+    return emitter
+
+
+def test_hair_curves_move_with_their_object_as_in_cycles(stage: Any, render: Callable[..., Any]) -> None:
+    subject = fur(stage)
+    stage.cycles_curves.subdivisions = 4  # see test_hair_against_cycles.py
+    animate(subject, "location", (-0.8, 0.0, 0.0), (0.8, 0.3, 0.2))
+    animate(subject, "rotation_euler", (0.2, 0.0, -0.7), (0.0, 0.3, 0.7))
+    check(render)
+
+
+def test_particle_hair_moves_with_its_emitter_as_in_cycles(stage: Any, render: Callable[..., Any]) -> None:
+    emitter = particle_hair()
     animate(emitter, "location", (-0.8, -0.5, 0.0), (0.8, -0.2, 0.2))
     check(render)
+
+
+def test_hair_curves_that_change_their_shape_are_blurred_as_in_cycles(stage: Any, render: Callable[..., Any]) -> None:
+    subject = fur(stage)
+    stage.cycles_curves.subdivisions = 4
+    group = bpy.data.node_groups.new("Sway", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    nodes, links = group.nodes, group.links
+    inside, outside = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput")
+    move, times, place = (
+        nodes.new(kind) for kind in ("GeometryNodeSetPosition", "ShaderNodeVectorMath", "GeometryNodeInputPosition")
+    )
+    times.operation = "MULTIPLY"
+    links.new(inside.outputs[0], move.inputs["Geometry"])
+    links.new(place.outputs[0], times.inputs[0])
+    links.new(times.outputs[0], move.inputs["Offset"])
+    links.new(move.outputs[0], outside.inputs[0])
+    subject.modifiers.new("Sway", "NODES").node_group = group
+    animate(times.inputs[1], "default_value", (-0.6, 0.8, 0.0), (0.3, -0.5, 0.0))
+    animate(subject, "location", (0.0, -0.3, 0.0), (0.0, 0.3, 0.0))
+    check(render)
+
+
+def test_particle_hair_follows_an_emitter_that_changes_its_shape_as_in_cycles(
+    stage: Any, render: Callable[..., Any]
+) -> None:
+    emitter = particle_hair()
+    emitter.shape_key_add(name="Rest")
+    tilted = emitter.shape_key_add(name="Tilted")
+    for point in tilted.data:
+        point.co.z += 0.9 * point.co.x
+    animate(tilted, "value", 0.0, 1.0)
+    check(render, samples=4 * SAMPLES)

@@ -18,6 +18,7 @@ from luch.scene import Camera, Film, Instances, Light, Material, Medium, Mesh, O
 from luch.shader import ProgramBuilder
 from luch.shader_code import OPS
 from support.effects import ONE, closure, principled, program
+from support.hair import strands
 
 SIZE, SAMPLES = 12, 4
 PATHS = SIZE * SIZE * SAMPLES
@@ -264,3 +265,23 @@ def test_volumes_cost_nothing_where_there_are_none() -> None:
     assert foggy.passes["Combined"][..., :3].mean() < 0.7 * plain.passes["Combined"][..., :3].mean()
     assert effects_of(empty)["volumes"].reason == 'world "Night" absorbs 0.1 0.1 0.1 per metre'
     assert not effects_of(empty)["volume bounces"].on
+
+
+def test_hair_costs_nothing_where_there_is_none() -> None:
+    bald = room()
+    without, plain = rendered(bald)
+    assert without["curve_pieces"] == 0
+    assert not effects_of(bald)["hair"].on and not effects_of(bald)["hair shading"].on
+    bald.settings.curve_shape, bald.settings.curve_subdivisions = "THICK", 4
+    same, result = rendered(bald)
+    assert same_bits(plain, result)
+    assert [same[name] for name in ("structure_bytes", "rays")] == [
+        without[name] for name in ("structure_bytes", "rays")
+    ]
+    furry = room()
+    furry.meshes[1].curves = strands([[-1.0, 0.0, 2.2, 0.2], [1.0, 0.3, 2.4, 0.2]]).curves
+    assert effects_of(furry)["hair"].on and not effects_of(furry)["hair shading"].on
+    with_hair, shaggy = rendered(furry)
+    assert with_hair["curve_pieces"] == 4
+    assert with_hair["structure_bytes"] > without["structure_bytes"]
+    assert not same_bits(plain, shaggy)

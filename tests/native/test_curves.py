@@ -198,8 +198,6 @@ def test_curves_show_the_material_of_their_slot_and_let_light_through_where_it_i
     ("points", "first", "fact"),
     [
         (np.zeros((4, 3), np.float32), [0], r"points \(P, 4\)"),
-        (np.array([[0, 0, 0, 1], [0, np.nan, 0, 1]], np.float32), [0], "point 1"),
-        (np.array([[0, 0, 0, 1], [0, 0, 1, -1.0]], np.float32), [0], "point 1"),
         (np.zeros((4, 4), np.float32), [0, 3, 2], "curve 1"),
         (np.zeros((4, 4), np.float32), [1], "leave points out"),
     ],

@@ -7,11 +7,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from luch.scene import Light, Material, Scene
+from luch.scene import Instances, Light, Material, Mesh, Object, Scene
 from luch.shader import ProgramBuilder
 
 from support.effects import closure, principled, program
-from support.everything import everything
+from support.everything import everything, quad
+from support.hair import fibre, strands
 
 
 def _material(scene: Scene, index: int, build: Callable[[ProgramBuilder], None]) -> None:
@@ -83,6 +84,39 @@ def _holdout(scene: Scene) -> None:
     scene.objects[2] = replace(scene.objects[2], holdout=True)
 
 
+def _show(scene: Scene, mesh: Mesh, build: Callable[[ProgramBuilder], None]) -> None:
+    """One object more, where it stands, of a material of its own."""
+    scene.meshes.append(mesh)
+    scene.materials.append(Material(mesh.name, program(build)))
+    scene.objects.append(Object(mesh.name, len(scene.meshes) - 1, [len(scene.materials) - 1]))
+    old = scene.instances
+    assert old is not None
+    scene.instances = Instances(
+        np.append(old.object, np.uint32(len(scene.objects) - 1)),
+        np.concatenate([old.matrix, np.eye(3, 4)[None]]),
+        np.append(old.random, np.float32(0.3)),
+        np.concatenate([old.generated, np.zeros((1, 3), np.float32)]),
+        np.concatenate([old.uv, np.zeros((1, 2), np.float32)]),
+    )
+
+
+def _hair(scene: Scene) -> None:
+    """Below the leaves: a shadow ray that goes on behind one begins there anew, near which no ribbon is met."""
+    rng = np.random.default_rng(6)
+    strand = np.array([[-1.0, 0.0, 0.1, 0.15], [0.1, 0.3, 0.7, 0.12], [0.9, -0.2, 1.1, 0.05]])
+    rows = [strand + np.append(rng.uniform(-1.0, 1.0, 2), [0.0, 0.0]) for _ in range(6)]
+    _show(scene, strands(*rows), _chalk)
+
+
+def _hair_shading(scene: Scene) -> None:
+    """On a surface: closures of hair and curves are apart."""
+    _show(scene, quad("Braid", 0.6, 1.0), fibre)
+
+
+def _round_hair(scene: Scene) -> None:
+    scene.settings.curve_shape = "THICK"
+
+
 EFFECTS: dict[str, Callable[[Scene], None]] = {
     "coat": _coat,
     "sheen": _sheen,
@@ -99,6 +133,9 @@ EFFECTS: dict[str, Callable[[Scene], None]] = {
     "filter glossy": _blur,
     "passes": _passes,
     "holdout": _holdout,
+    "hair": _hair,
+    "hair shading": _hair_shading,
+    "round hair": _round_hair,
 }
 
 

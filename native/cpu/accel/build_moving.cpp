@@ -38,7 +38,7 @@ bool read_triangle(const SceneView& scene, u32 mesh_index, u32 prim, u32 keys, s
 void gather_corners(Group& group, const SceneView& scene, u32 keys, std::vector<u32>* refs) {
     MovingTrees& moving = *group.moving;
     u32 mesh = group.members[0].mesh, count = scene.meshes[mesh].triangle_count;
-    moving.corners.assign(size_t(keys) * count * 9, 0.0f);
+    moving.rows.assign(size_t(keys) * count * 9, 0.0f);
     std::vector<Vec3> corners(3 * size_t(keys));
     for (u32 prim = 0; prim < count; ++prim) {
         if (!read_triangle(scene, mesh, prim, keys, &corners)) continue;
@@ -46,12 +46,39 @@ void gather_corners(Group& group, const SceneView& scene, u32 keys, std::vector<
         for (u32 key = 0; key < keys; ++key)
             for (u32 k = 0; k < 3; ++k) {
                 const Vec3 p = corners[3 * key + k];
-                float* out = moving.corners.data() + 9 * (size_t(key) * count + prim) + 3 * k;
+                float* out = moving.rows.data() + 9 * (size_t(key) * count + prim) + 3 * k;
                 out[0] = p.x, out[1] = p.y, out[2] = p.z;
             }
     }
-    group.kept = refs->size();
-    group.dropped = count - group.kept;
+    moving.view.stride = 9 * u64(count);
+    moving.view.pieces = keys - 1;
+}
+
+// The mesh's curves at every key: the scene may go away. refs: pieces that can be traced at all of them, though at some
+// they may have no radius.
+void gather_curves(Group& group, const SceneView& scene, std::vector<u32>* refs) {
+    MovingTrees& moving = *group.moving;
+    const MeshView& mesh = scene.meshes[group.members[0].mesh];
+    const MeshMotion& motion = scene.motion->meshes[group.members[0].mesh];
+    CurveSet curves = curves_of(scene, mesh);
+    moving.segments.assign(curves.segments, curves.segments + mesh.segment_count);
+    curves.segments = moving.segments.data();
+    u64 stride = 4 * u64(motion.curve_point_count);
+    const float* first = scene.motion->curve_points + 4 * u64(motion.first_curve_point);
+    moving.rows.assign(first, first + stride * motion.curve_key_count);
+    for (u32 piece = 0; piece < piece_count(curves); ++piece) {
+        bool finite = true, thick = false;
+        for (u32 key = 0; key < motion.curve_key_count; ++key) {
+            curves.points = moving.rows.data() + stride * key;
+            finite = finite && piece_is_finite(curves, piece);
+            thick = thick || piece_has_radius(curves, piece);
+        }
+        if (finite && thick) refs->push_back(piece);
+    }
+    curves.points = moving.rows.data();
+    moving.view.stride = stride;
+    moving.view.pieces = motion.curve_key_count - 1;
+    moving.view.curves = curves;
 }
 
 float row_sum(const Affine& a, int row) {
@@ -100,7 +127,7 @@ u64 MovingTrees::nodes() const {
     return sum;
 }
 u64 MovingTrees::bytes() const {
-    u64 sum = corners.size() * sizeof(float) + flags.size() + views.size() * sizeof(Bvh2);
+    u64 sum = rows.size() * sizeof(float) + segments.size() * sizeof(u32) + flags.size() + views.size() * sizeof(Bvh2);
     for (const Tree2& tree : trees) sum += tree.nodes.size() * sizeof(Bvh2Node) + tree.refs.size() * sizeof(u32);
     return sum;
 }
@@ -114,18 +141,26 @@ void build_moving_group(Group& group, const SceneView& scene, const std::vector<
                         const AccelChoice& choice, ThreadPool& pool) {
     group.moving = std::make_unique<MovingTrees>();
     MovingTrees& moving = *group.moving;
-    u32 mesh = group.members[0].mesh, keys = scene.motion->meshes[mesh].key_count;
+    const Member& member = group.members[0];
     std::vector<u32> refs;
-    gather_corners(group, scene, keys, &refs);
+    if (group.kind == GroupKind::CURVES)
+        gather_curves(group, scene, &refs);
+    else
+        gather_corners(group, scene, scene.motion->meshes[member.mesh].key_count, &refs);
+    group.kept = refs.size();
+    group.dropped = member.prim_count - group.kept;
     group.precision = choice.precision;
     group.root = empty_box();
     if (refs.empty()) return;
-    if (!flags.empty()) moving.flags = flags[mesh];
-    const u8* flag = moving.flags.empty() ? nullptr : moving.flags.data();
-    moving.view = {nullptr, moving.corners.data(), flag, scene.meshes[mesh].triangle_count, keys - 1};
-    for (u32 piece = 0; piece + 1 < keys; ++piece) {
+    if (!flags.empty() && !flags[member.mesh].empty()) {
+        const u8* own = flags[member.mesh].data() + member.first_prim;
+        moving.flags.assign(own, own + member.prim_count);
+    }
+    moving.view.rows = moving.rows.data();
+    moving.view.flags = moving.flags.empty() ? nullptr : moving.flags.data();
+    for (u32 piece = 0; piece < moving.view.pieces; ++piece) {
         HugeArray<PrimBox> boxes(refs.size());
-        MovingTriangles all = triangles_at(moving.view, {piece, 0.0f});
+        MovingPrimitives all = primitives_at(moving.view, {piece, 0.0f});
         for (size_t i = 0; i < refs.size(); ++i) {
             Box b = primitive_box(all, refs[i]);
             boxes[i] = {{-b.lo.x, -b.lo.y, -b.lo.z}, refs[i], {b.hi.x, b.hi.y, b.hi.z}, 0};
@@ -172,7 +207,9 @@ void SceneMotion::describe(DeviceImage& image, u32 block, const TraceMotion* con
         if (!group.moving) continue;
         const MovingTrees& trees = *group.moving;
         const MovingGroup& own = groups[next++];
-        image.add_array("moving corners", moving, own.corners, trees.corners.size());
+        image.add_array("moving rows", moving, own.rows, trees.rows.size());
+        if (!trees.segments.empty())
+            image.add_array("moving segments", moving, own.curves.segments, trees.segments.size());
         image.add_array("moving flags", moving, own.flags, trees.flags.size());
         u32 views = image.add_array("moving trees", moving, own.trees, trees.views.size());
         for (size_t piece = 0; piece < trees.views.size(); ++piece) {

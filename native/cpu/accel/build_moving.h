@@ -10,7 +10,8 @@
 namespace luch::cpu {
 
 struct MovingTrees {
-    std::vector<float> corners;
+    std::vector<float> rows;
+    std::vector<u32> segments;  // of hair
     std::vector<u8> flags;
     std::vector<Tree2> trees;   // one a piece of time
     std::vector<Bvh2> views;

@@ -109,6 +109,9 @@ class Planner {
         u32 visibility, group;
         u64 refs;
     };
+    static u32 keys_of(const MeshMotion& motion, GroupKind kind) {
+        return kind == GroupKind::TRIANGLES ? motion.key_count : kind == GroupKind::CURVES ? motion.curve_key_count : 0;
+    }
     // The group of these primitives of a mesh, in the mesh's own space, is made for the first instance that asks.
     void share(u32 i, const Member& primitives, GroupKind kind, u32* group) {
         if (*group == NONE) {
@@ -116,8 +119,7 @@ class Planner {
             Group& made = plan.groups.emplace_back();
             made.members = {primitives};
             made.kind = kind;
-            made.deforms =
-                kind == GroupKind::TRIANGLES && scene_.motion && scene_.motion->meshes[primitives.mesh].key_count != 0;
+            made.deforms = scene_.motion && keys_of(scene_.motion->meshes[primitives.mesh], kind) != 0;
         }
         const InstanceView& instance = scene_.instances[i];
         if (is_finite(instance.to_world) && is_finite(instance.to_object))

@@ -2,14 +2,28 @@
 
 #include <algorithm>
 
+#include "cpu/curve_store.h"
+
 namespace luch::cpu {
 
 void MotionStore::add_mesh(u32 mesh, u32 vertex_count, u32 normal_rows, u32 key_count, const float* positions,
                            const float* normals) {
     if (meshes_.size() <= mesh) meshes_.resize(mesh + 1);
-    meshes_[mesh] = {u32(positions_.size() / 3), u32(normals_.size() / 3), key_count};
+    MeshMotion& motion = meshes_[mesh];
+    motion.first_position = u32(positions_.size() / 3);
+    motion.first_normal = u32(normals_.size() / 3);
+    motion.key_count = key_count;
     positions_.insert(positions_.end(), positions, positions + size_t(key_count) * vertex_count * 3);
     if (normals) normals_.insert(normals_.end(), normals, normals + size_t(key_count) * normal_rows * 3);
+}
+
+void MotionStore::add_curves(u32 mesh, u32 point_count, u32 key_count, const float* points) {
+    if (meshes_.size() <= mesh) meshes_.resize(mesh + 1);
+    MeshMotion& motion = meshes_[mesh];
+    motion.first_curve_point = u32(curve_points_.size() / 4);
+    motion.curve_point_count = point_count;
+    motion.curve_key_count = key_count;
+    add_curve_points(curve_points_, points, size_t(key_count) * point_count);
 }
 
 bool MotionStore::add_instance(u32 instance, const std::vector<Matrix>& matrices) {
@@ -30,8 +44,9 @@ const MotionView* MotionStore::finish(size_t mesh_count, std::vector<InstanceVie
     for (size_t i = 0; i < instances.size(); ++i) {
         if (instances_[i].key_count) instances[i].flags |= INSTANCE_MOVES;
         if (meshes_[instances[i].mesh].key_count) instances[i].flags |= INSTANCE_DEFORMS;
+        if (meshes_[instances[i].mesh].curve_key_count) instances[i].flags |= INSTANCE_HAIR_DEFORMS;
     }
-    view_ = {instances_.data(), keys_.data(), meshes_.data(), positions_.data(), normals_.data()};
+    view_ = {instances_.data(), keys_.data(), meshes_.data(), positions_.data(), normals_.data(), curve_points_.data()};
     return &view_;
 }
 
@@ -43,11 +58,13 @@ void MotionStore::describe(DeviceImage& image, u32 block, const SceneView& view)
     image.add_array("moving meshes", motion, view_.meshes, meshes_.size());
     image.add_array("moving positions", motion, view_.positions, positions_.size());
     image.add_array("moving normals", motion, view_.normals, normals_.size());
+    image.add_array("moving curve points", motion, view_.curve_points, curve_points_.size());
 }
 
 size_t MotionStore::bytes() const {
     return instances_.size() * sizeof(InstanceMotion) + keys_.size() * sizeof(TransformKey) +
-           meshes_.size() * sizeof(MeshMotion) + (positions_.size() + normals_.size()) * sizeof(float);
+           meshes_.size() * sizeof(MeshMotion) +
+           (positions_.size() + normals_.size() + curve_points_.size()) * sizeof(float);
 }
 
 }  // namespace luch::cpu

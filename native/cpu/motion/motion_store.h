@@ -13,6 +13,8 @@ class MotionStore {
     // positions: 3 floats a vertex, normals: 3 a row, key by key; normals null where the mesh is flat.
     void add_mesh(u32 mesh, u32 vertex_count, u32 normal_rows, u32 key_count, const float* positions,
                   const float* normals);
+    // points: place and radius, key by key.
+    void add_curves(u32 mesh, u32 point_count, u32 key_count, const float* points);
     // False where the keys say nothing: not finite, flat, or all alike.
     bool add_instance(u32 instance, const std::vector<Matrix>& matrices);
 
@@ -26,7 +28,7 @@ class MotionStore {
     std::vector<InstanceMotion> instances_;
     std::vector<TransformKey> keys_;
     std::vector<MeshMotion> meshes_;
-    std::vector<float> positions_, normals_;
+    std::vector<float> positions_, normals_, curve_points_;
 };
 
 }  // namespace luch::cpu

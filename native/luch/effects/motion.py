@@ -63,7 +63,10 @@ def _objects(scene: Scene) -> str:
 
 
 def _shapes(scene: Scene, shown: Shown) -> str:
-    names = [scene.meshes[mesh].name for mesh in shown.uses if scene.meshes[mesh].motion_positions is not None]
+    meshes = (scene.meshes[mesh] for mesh in shown.uses)
+    names = [
+        m.name for m in meshes if m.motion_positions is not None or (m.curves and m.curves.motion_points is not None)
+    ]
     if not names:
         return ""
     more = f" and {len(names) - 1} more change" if len(names) > 1 else " changes"

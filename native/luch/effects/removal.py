@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from luch.effects.editing import Change, Editor, rewrite
-from luch.scene import Scene
+from luch.scene import Mesh, Scene
 from luch.shader_code import PRINCIPLED, Node
 
 
@@ -127,7 +127,12 @@ def _still_objects(scene: Scene) -> Scene:
 
 
 def _still_shapes(scene: Scene) -> Scene:
-    return replace(scene, meshes=[replace(m, motion_positions=None, motion_normals=None) for m in scene.meshes])
+    return replace(scene, meshes=[_still_shape(mesh) for mesh in scene.meshes])
+
+
+def _still_shape(mesh: Mesh) -> Mesh:
+    curves = mesh.curves and replace(mesh.curves, motion_points=None)
+    return replace(mesh, motion_positions=None, motion_normals=None, curves=curves)
 
 
 def _no_pass(prefix: str) -> Callable[[Scene], Scene]:

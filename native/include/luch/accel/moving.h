@@ -1,6 +1,6 @@
 // Entries that move. An instance's transform is that of the ray's time. A mesh that changes its shape is a group of its
-// own kind: for each piece of time between two keys a binary tree, over boxes that hold each triangle all that time; its
-// triangles are blended for the ray. So what a ray hits at a time is what it would hit were all of it traced still: the
+// own kind: for each piece of time between two keys a binary tree, over boxes that hold each triangle, or piece of hair,
+// all that time; those are blended for the ray. So what a ray hits at a time is what it would hit were all of it traced still: the
 // same numbers go into the same test.
 #pragma once
 #include "luch/accel/bvh2.h"
@@ -9,18 +9,21 @@
 
 namespace luch {
 
-// Triangles between two keys. As Primitives, for the walk of a structure.
-struct MovingTriangles {
-    const float *open, *close;  // nine floats a triangle, by ref: at the piece's ends
+// Triangles or hair between two keys. As Primitives, for the walk of a structure.
+struct MovingPrimitives {
+    const float *open, *close;  // rows of MovingGroup at the ends of the piece of time
     const u8* flags;  // PrimitiveFlag by ref; null: none
-    float share;  // of the piece that has passed
+    float share;  // of that time that has passed
+    CurveSet curves;  // those at its beginning; without segments where these are triangles
 };
 
 struct MovingGroup {
     const Bvh2* trees;  // one a piece of time
-    const float* corners;  // nine floats a triangle, by ref, key by key; refs are the mesh's triangles
+    const float* rows;  // key by key; of triangles nine floats each, by ref, of hair four a point
     const u8* flags;
-    u32 triangle_count, pieces;
+    u64 stride;  // floats of a key
+    u32 pieces;  // of time
+    CurveSet curves;  // as of MovingPrimitives, its points those of the first key
 };
 
 // What an entry does while the shutter is open. GroupEntry::motion: its number + 1.
@@ -35,12 +38,25 @@ struct TraceMotion {
     const MovingGroup* groups;
 };
 
-LUCH_FN MovingTriangles triangles_at(const MovingGroup& group, const MotionPiece& piece) {
-    const float* open = group.corners + 9 * u64(group.triangle_count) * piece.key;
-    return {open, open + 9 * u64(group.triangle_count), group.flags, piece.share};
+LUCH_FN MovingPrimitives primitives_at(const MovingGroup& group, const MotionPiece& piece) {
+    const float* open = group.rows + group.stride * piece.key;
+    MovingPrimitives all = {open, open + group.stride, group.flags, piece.share, group.curves};
+    all.curves.points = open;
+    return all;
 }
+LUCH_FN bool are_curves(const MovingPrimitives& all) { return plan::CURVES && all.curves.segment_count != 0u; }
 
-LUCH_FN Box primitive_box(const MovingTriangles& all, u32 ref) {
+// All that a capsule needs (its ends, its radius, what rounding adds) is convex in time, so the boxes at the ends hold
+// what lies between.
+LUCH_FN Box moving_piece_box(const MovingPrimitives& all, u32 piece) {
+    CurveSet later = all.curves;
+    later.points = all.close;
+    Box box = capsule_box(piece_capsule(all.curves, piece));
+    extend(box, capsule_box(piece_capsule(later, piece)));
+    return box;
+}
+LUCH_FN Box primitive_box(const MovingPrimitives& all, u32 ref) {
+    if (are_curves(all)) return moving_piece_box(all, ref);
     const float *a = all.open + 9 * u64(ref), *b = all.close + 9 * u64(ref);
     Box box = triangle_box(vec3_of(a), vec3_of(a + 3), vec3_of(a + 6));
     extend(box, triangle_box(vec3_of(b), vec3_of(b + 3), vec3_of(b + 6)));
@@ -48,8 +64,13 @@ LUCH_FN Box primitive_box(const MovingTriangles& all, u32 ref) {
 }
 
 template <Precision P, class Count>
-LUCH_FN bool test_primitive(const MovingTriangles& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, float t_max,
+LUCH_FN bool test_primitive(const MovingPrimitives& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, float t_max,
                             TriangleHit* hit, Count& count) {
+    if (are_curves(all)) {
+        count.primitive(132);
+        return test_moving_piece<P>(all.curves, all.close, all.share, ref, ray.origin, ray.direction, t_min, t_max,
+                                    hit);
+    }
     const float *a = all.open + 9 * u64(ref), *b = all.close + 9 * u64(ref);
     count.primitive(72);
     Vec3 p[3];
@@ -81,12 +102,12 @@ LUCH_FN const MovingGroup* moving_group(const TraceMotion& motion, const Entry& 
 template <Precision P, class Count>
 LUCH_FN void closest_hit(const MovingGroup& group, const Ray& ray, float time, RefHit* best, Count& count) {
     MotionPiece piece = motion_piece(group.pieces + 1u, time);
-    closest_hit<P>(group.trees[piece.key], triangles_at(group, piece), ray, best, count);
+    closest_hit<P>(group.trees[piece.key], primitives_at(group, piece), ray, best, count);
 }
 template <Precision P, class Count>
 LUCH_FN u8 any_hit(const MovingGroup& group, const Ray& ray, float time, Count& count) {
     MotionPiece piece = motion_piece(group.pieces + 1u, time);
-    return any_hit<P>(group.trees[piece.key], triangles_at(group, piece), ray, count);
+    return any_hit<P>(group.trees[piece.key], primitives_at(group, piece), ray, count);
 }
 
 }  // namespace luch

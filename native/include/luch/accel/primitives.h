@@ -103,6 +103,14 @@ LUCH_FN_APART bool test_piece(const CurveSet& set, u32 piece, Vec3 origin, Vec3 
     return intersect_piece(set, piece, ray, t_min, t_max, hit);
 }
 
+// The same of hair that changes its shape; set: its curves at the key before, later: the points of the next.
+template <Precision P>
+LUCH_FN_APART bool test_moving_piece(const CurveSet& set, const float* later, float share, u32 piece, Vec3 origin,
+                                     Vec3 direction, float t_min, float t_max, TriangleHit* hit) {
+    auto ray = make_curve_ray<typename CurveNumber<P>::Type>(origin, direction);
+    return intersect_piece_of(segment_between(set, later, piece, share), set, piece, ray, t_min, t_max, hit);
+}
+
 template <Precision P, class Count>
 LUCH_FN bool test_primitive(const Primitives& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, float t_max,
                             TriangleHit* hit, Count& count) {
@@ -134,7 +142,7 @@ LUCH_FN Box primitive_box(const Primitives& all, u32 ref) {
 
 LUCH_FN bool is_closer(float t, u32 ref, const RefHit& best) { return t < best.t || (t == best.t && ref < best.ref); }
 
-// Tests one primitive and keeps it if it is the better hit. All: Primitives, or triangles that move (moving.h).
+// Tests one primitive and keeps it if it is the better hit. All: Primitives, or those that move (moving.h).
 template <Precision P, class All, class Count>
 LUCH_FN void offer_primitive(const All& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, RefHit* best,
                              Count& count) {

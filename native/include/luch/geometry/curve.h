@@ -3,6 +3,7 @@
 // pieces of equal parameter, and a piece is a primitive: long thin segments lie badly in boxes of any structure.
 #pragma once
 #include "luch/geometry/box.h"
+#include "luch/geometry/motion.h"
 #include "luch/geometry/precision.h"
 #include "luch/geometry/ray.h"
 
@@ -51,6 +52,14 @@ LUCH_FN CurveSegment load_segment(const float* points, u32 word) {
 }
 LUCH_FN CurveSegment segment_of_piece(const CurveSet& set, u32 piece) {
     return load_segment(set.points, set.segments[piece >> set.log2_pieces]);
+}
+// Of hair that changes its shape: points of the same segments at a later key, `share` of the way to them.
+LUCH_FN CurveSegment segment_between(const CurveSet& set, const float* later, u32 piece, float share) {
+    u32 word = set.segments[piece >> set.log2_pieces];
+    CurveSegment a = load_segment(set.points, word), b = load_segment(later, word);
+    for (int i = 0; i < 4; ++i)
+        a.k[i] = {between(a.k[i].p, b.k[i].p, share), between(a.k[i].radius, b.k[i].radius, share)};
+    return a;
 }
 
 // The part of its segment that a piece is; exact, so that neighbours end where the next begins.
@@ -152,15 +161,22 @@ LUCH_FN Box capsule_box(const Capsule& c) {
 }
 
 // What every builder leaves out: points that are not finite, pieces without a radius.
-LUCH_FN bool piece_can_be_traced(const CurveSet& set, u32 piece) {
+LUCH_FN bool piece_is_finite(const CurveSet& set, u32 piece) {
     CurveSegment s = segment_of_piece(set, piece);
     for (int i = 0; i < 4; ++i)
         if (!point_can_be_traced(s.k[i].p) || !(abs_f(s.k[i].radius) <= LARGEST_COORDINATE)) return false;
+    return finite_f(piece_capsule(set, piece).radius);
+}
+LUCH_FN bool piece_has_radius(const CurveSet& set, u32 piece) {
+    CurveSegment s = segment_of_piece(set, piece);
     PieceRange range = range_of_piece(set.log2_pieces, piece);
     bool cubic = set.shape != CurveShape::THICK_LINEAR;
     float from = cubic ? radius_of(s, curve_weights(range.from)) : s.k[1].radius;
     float to = cubic ? radius_of(s, curve_weights(range.to)) : s.k[2].radius;
-    return max_f(from, to) > 0.0f && finite_f(piece_capsule(set, piece).radius);
+    return max_f(from, to) > 0.0f;
+}
+LUCH_FN bool piece_can_be_traced(const CurveSet& set, u32 piece) {
+    return piece_is_finite(set, piece) && piece_has_radius(set, piece);
 }
 
 }  // namespace luch

@@ -279,14 +279,19 @@ LUCH_FN bool intersect_linear(const CurveSegment& segment, const CurveRay<F>& ra
 
 // ---- any --------------------------------------------------------------------------------------------------------
 
+// s: the segment that the piece is of.
 template <class F>
-LUCH_FN bool intersect_piece(const CurveSet& set, u32 piece, const CurveRay<F>& ray, float t_min, float t_max,
-                             TriangleHit* hit) {
-    CurveSegment s = segment_of_piece(set, piece);
+LUCH_FN bool intersect_piece_of(const CurveSegment& s, const CurveSet& set, u32 piece, const CurveRay<F>& ray,
+                                float t_min, float t_max, TriangleHit* hit) {
     if (set.shape == CurveShape::THICK_LINEAR) return intersect_linear(s, ray, t_min, t_max, hit);
     PieceRange range = range_of_piece(set.log2_pieces, piece);
     return set.shape == CurveShape::RIBBON ? intersect_ribbon(s, range, ray, t_min, t_max, hit)
                                            : intersect_thick(s, range, ray, t_min, t_max, hit);
+}
+template <class F>
+LUCH_FN bool intersect_piece(const CurveSet& set, u32 piece, const CurveRay<F>& ray, float t_min, float t_max,
+                             TriangleHit* hit) {
+    return intersect_piece_of(segment_of_piece(set, piece), set, piece, ray, t_min, t_max, hit);
 }
 
 // Whether the ray's line comes near a capsule at all; never false where intersect_piece hits. As for spheres

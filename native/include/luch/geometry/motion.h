@@ -104,9 +104,10 @@ LUCH_FN_SLOW Affine inverse_of(const Affine& a) {
     return out;
 }
 
-// Of a mesh: rows of positions and normals at its keys, key by key; key_count 0: it keeps its shape.
+// Of a mesh: rows of positions and normals at its keys, key by key; key_count 0: it keeps its shape. The same of its hair.
 struct MeshMotion {
     u32 first_position, first_normal, key_count;
+    u32 first_curve_point, curve_point_count, curve_key_count;
 };
 
 // Everything that moves; plain pointers, as in SceneView.
@@ -116,6 +117,7 @@ struct MotionView {
     const MeshMotion* meshes;  // by mesh
     const float* positions;  // 3 a row
     const float* normals;  // 3 a row; as many a key as the mesh has
+    const float* curve_points;  // 4 a row
 };
 
 }  // namespace luch

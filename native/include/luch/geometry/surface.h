@@ -92,23 +92,22 @@ LUCH_FN Vec3 entered_cylinder_at(Vec3 center, Vec3 tangent, float radius, Vec3 o
 }
 
 // A point on a curve's piece. The normal that is shaded is that of the round curve, on a ribbon too.
-LUCH_FN_SLOW SurfacePoint curve_point(const CurveSet& curves, u32 piece, const Hit& hit, const Ray& ray,
+LUCH_FN_SLOW SurfacePoint curve_point(const CurveSegment& s, CurveShape shape, const Hit& hit, const Ray& ray,
                                       const Affine& to_world, const Affine& to_object) {
-    CurveSegment s = segment_of_piece(curves, piece);
     Vec3 origin = transform_point(to_object, ray.origin), direction = transform_direction(to_object, ray.direction);
     double t = double(hit.t);
     Vec3 p = {float(double(origin.x) + t * double(direction.x)), float(double(origin.y) + t * double(direction.y)),
               float(double(origin.z) + t * double(direction.z))};
-    Vec3 tangent = curve_tangent(s, curves.shape, hit.u), n;
+    Vec3 tangent = curve_tangent(s, shape, hit.u), n;
     Vec3 error = gamma_f(2) * abs_v(p);
     float extent = length(s.k[2].p - s.k[1].p);
-    if (curves.shape == CurveShape::RIBBON) {
+    if (shape == CurveShape::RIBBON) {
         // Its v is the sine of the round curve's normal against the ray (geometry/curve_test.h).
         Vec3 unit = normalize_or(tangent, {1.0f, 0.0f, 0.0f});
         Vec3 across = normalize_or(cross(unit, -direction), make_vec3(0.0f));
         n = normalize_or(across * hit.v + cross(across, unit) * safe_sqrt(1.0f - sqr(hit.v)), -normalize(direction));
     } else {
-        bool cubic = curves.shape == CurveShape::THICK;
+        bool cubic = shape == CurveShape::THICK;
         CurveWeights w = curve_weights(hit.u);
         Vec3 center = cubic ? place_of(s, w) : s.k[1].p + (s.k[2].p - s.k[1].p) * hit.u;
         float radius = cubic ? radius_of(s, w) : length(p - center);
@@ -122,7 +121,7 @@ LUCH_FN_SLOW SurfacePoint curve_point(const CurveSet& curves, u32 piece, const H
     }
     SurfacePoint point = instance_point(p, error, extent, to_world, to_object);
     point.radial = normalize_or(transform_direction_transposed(to_object, n), n);
-    point.outward = curves.shape == CurveShape::RIBBON ? -normalize(ray.direction) : point.radial;
+    point.outward = shape == CurveShape::RIBBON ? -normalize(ray.direction) : point.radial;
     return point;
 }
 
@@ -132,7 +131,7 @@ LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit, const
     const InstanceView& instance = instance_at_time(scene, hit.instance, time, &moved);
     const MeshView& mesh = scene.meshes[instance.mesh];
     if (is_curve(mesh, hit.prim))
-        return curve_point(curves_of(scene, mesh), hit.prim - first_piece(mesh), hit, ray, instance.to_world,
+        return curve_point(segment_at(scene, instance, hit.prim, time), scene.curve_shape, hit, ray, instance.to_world,
                            instance.to_object);
     if (is_sphere(mesh, hit.prim)) {
         const float* s = sphere_at(scene, mesh, hit.prim);

@@ -37,6 +37,7 @@ enum InstanceFlag : u32 {
     INSTANCE_WORLD_NORMALS = 8u,  // its mesh's normals become unit in the world, not before
     INSTANCE_MOVES = 16u,          // to_world and to_object are those of the shutter's middle: see instance_at_time
     INSTANCE_DEFORMS = 32u,        // so are its mesh's positions and normals
+    INSTANCE_HAIR_DEFORMS = 64u,   // so are its mesh's curves
 };
 
 struct InstanceView {
@@ -204,6 +205,24 @@ LUCH_FN_SLOW Triangle deformed_triangle(const SceneView& scene, u32 mesh_index, 
 LUCH_FN Triangle triangle_at(const SceneView& scene, const InstanceView& instance, u32 prim, float time) {
     if (plan::MOTION && (instance.flags & INSTANCE_DEFORMS)) return deformed_triangle(scene, instance.mesh, prim, time);
     return triangle_at(scene, scene.meshes[instance.mesh], prim);
+}
+
+LUCH_FN_SLOW CurveSegment deformed_segment(const SceneView& scene, u32 mesh_index, u32 prim, float time) {
+    const MeshView& mesh = scene.meshes[mesh_index];
+    const MeshMotion& motion = scene.motion->meshes[mesh_index];
+    MotionPiece piece = motion_piece(motion.curve_key_count, time);
+    CurveSet curves = curves_of(scene, mesh);
+    u64 rows = motion.first_curve_point + u64(piece.key) * motion.curve_point_count;
+    curves.points = scene.motion->curve_points + 4 * rows;
+    return segment_between(curves, curves.points + 4 * u64(motion.curve_point_count), prim - first_piece(mesh),
+                           piece.share);
+}
+// The segment that a primitive of an instance's curves is of, in its object space, at a time.
+LUCH_FN CurveSegment segment_at(const SceneView& scene, const InstanceView& instance, u32 prim, float time) {
+    if (plan::MOTION && (instance.flags & INSTANCE_HAIR_DEFORMS))
+        return deformed_segment(scene, instance.mesh, prim, time);
+    const MeshView& mesh = scene.meshes[instance.mesh];
+    return segment_of_piece(curves_of(scene, mesh), prim - first_piece(mesh));
 }
 
 // The normals of a triangle's corners, object space; row: each one's within the mesh.

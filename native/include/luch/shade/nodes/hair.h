@@ -10,9 +10,8 @@ LUCH_FN_SLOW Vec3 fibre_direction(const OpContext& c, const InstanceView& instan
     const MeshView& mesh = c.scene->meshes[instance.mesh];
     const u32 prim = c.points->prim[c.lane];
     if (is_curve(mesh, prim)) {
-        CurveSet curves = curves_of(*c.scene, mesh);
-        CurveSegment s = segment_of_piece(curves, prim - first_piece(mesh));
-        return transform_direction(instance.to_world, curve_tangent(s, curves.shape, c.points->u[c.lane]));
+        CurveSegment s = segment_at(*c.scene, instance, prim, time_at(c));
+        return transform_direction(instance.to_world, curve_tangent(s, c.scene->curve_shape, c.points->u[c.lane]));
     }
     if (!is_triangle(mesh, prim)) return footprint_stencil(normal_at(c), 1.0f).dx;
     Triangle t = triangle_at(*c.scene, instance, prim, time_at(c));
@@ -34,8 +33,7 @@ LUCH_POINT_OP(OpCurvesInfo, 5, 0, {
     const InstanceView* i = placed_at(c, &moved);
     const u32 prim = c.points->prim[c.lane];
     if (!i || !is_curve(c.scene->meshes[i->mesh], prim)) return;
-    const MeshView& mesh = c.scene->meshes[i->mesh];
-    CurveSegment s = segment_of_piece(curves_of(*c.scene, mesh), prim - first_piece(mesh));
+    CurveSegment s = segment_at(*c.scene, *i, prim, time_at(c));
     float diameter = 2.0f * mix_f(s.k[1].radius, s.k[2].radius, c.points->u[c.lane]);
     out[0] = 1.0f;
     // A stretched one has many: this is the one towards (1, 1, 1), as Blender has it.
