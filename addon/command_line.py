@@ -11,7 +11,7 @@ import functools
 import sys
 from typing import Any, NoReturn
 
-from luch.stopping import UNLIMITED_SAMPLES
+from luch.stopping import CUSTOM, STEPS, UNLIMITED_SAMPLES
 
 
 class CommandLineError(ValueError):
@@ -27,6 +27,8 @@ OPTIONS = (
     "--luch-device CPU|CUDA",
     "--luch-error 0.01",
     "--luch-time SECONDS",
+    "--luch-quality DRAFT|PREVIEW|GOOD|HIGH|REFERENCE|CUSTOM",
+    "--luch-denoise",
     "--luch-samples N",
     "--luch-verify",
     "--luch-gpus N",
@@ -49,6 +51,8 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     parser.add_argument("--luch-error", type=_positive_number, dest="luch_error_limit")
     parser.add_argument("--luch-time", type=_positive_number, dest="luch_time_limit")
     parser.add_argument("--luch-samples", type=int)
+    parser.add_argument("--luch-quality", choices=(CUSTOM, *STEPS), type=str.upper)
+    parser.add_argument("--luch-denoise", action="store_const", const=True)
     parser.add_argument("--luch-verify", action="store_const", const=True)
     found, rest = parser.parse_known_args(own)
     unknown = [word for word in rest if word.startswith("--luch")]
@@ -57,6 +61,8 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     told = {name.removeprefix("luch_"): value for name, value in vars(found).items() if value is not None}
     if "error_limit" in told:
         told.setdefault("samples", UNLIMITED_SAMPLES)
+    if told.keys() & {"error_limit", "samples"}:
+        told.setdefault("quality", CUSTOM)  # a dial in the file gives way
     return told
 
 

@@ -104,6 +104,31 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         description="Stop when the picture's error is that small (relative, root mean square over all pixels); 0 for no limit. "
         "Max Samples still holds",
     )
+    quality: EnumProperty(
+        name="Quality",
+        items=[
+            ("CUSTOM", "Custom", "The settings below hold"),
+            ("DRAFT", "Draft", "An error of 20 %, as soon as this scene gets there"),
+            ("PREVIEW", "Preview", "An error of 10 %, as soon as this scene gets there"),
+            ("GOOD", "Good", "An error of 5 %, as soon as this scene gets there"),
+            ("HIGH", "High", "An error of 2 %, as soon as this scene gets there"),
+            ("REFERENCE", "Reference", "An error of 0.5 %, with nothing taken from the light"),
+        ],
+        default="CUSTOM",
+        description="How much error the picture may have. The settings that reach it soonest are found by a pilot on "
+        "this scene, which takes a tenth of the time at most; Time Limit still holds",
+    )
+    quality_by_report: BoolProperty(
+        name="By the Last Report",
+        default=False,
+        description="Choose by this scene's last report instead of a pilot",
+    )
+    use_denoising: BoolProperty(
+        name="Denoise",
+        default=False,
+        description="Combined goes through Open Image Denoise, guided by albedo and normal: less noise, biased; the "
+        "error that is told is that of the picture before",
+    )
     verify: BoolProperty(
         name="Verify the Error",
         default=False,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import bpy
 from luch import denoise
 from luch.scene import Scene
 
@@ -92,6 +94,19 @@ class ReportJob:
         assert self._process.stderr is not None
         with self._process.stderr as lines:
             self._errors += map(str.strip, lines)
+
+
+def file_name(scene: Any) -> str:
+    """The file's and the scene's, fit for a path."""
+    return re.sub(r"[^\w.-]+", "_", f"{Path(bpy.data.filepath).stem}_{scene.name}".strip("_"))
+
+
+def folder_of(scene: Any) -> Path:
+    """Where the report of a scene goes."""
+    path = scene.luch.report_folder
+    if path.startswith("//") and not bpy.data.filepath:
+        return Path(bpy.app.tempdir) / "luch_report"
+    return Path(bpy.path.abspath(path)) / file_name(scene)
 
 
 def _python() -> str:

@@ -9,6 +9,7 @@ SHARED_WITH_CYCLES = frozenset(
     {
         "samples",
         "time_limit",
+        "use_denoising",
         "seed",
         "use_animated_seed",
         "max_bounces",

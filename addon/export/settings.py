@@ -9,6 +9,7 @@ import numpy as np
 from luch.scene import Settings
 
 from .. import command_line
+from ..report_job import folder_of
 from ..settings import effective, names_of
 from .context import ExportContext
 
@@ -49,6 +50,9 @@ def export_settings(context: ExportContext) -> Settings:
         texture_memory=scene.luch.texture_memory,
         estimate_error=scene.luch.estimate_error,
         verify=scene.luch.verify,
+        denoise=effective(scene, "use_denoising"),
+        quality=scene.luch.quality,
+        quality_report=report_of(scene) if scene.luch.quality_by_report else "",
         error_limit=scene.luch.error_limit_percent / 100.0,
         without_effects=names_of(scene.luch.without_effects),
         force_effects=["ALL"] if scene.luch.force_effects else [],
@@ -63,6 +67,11 @@ def export_settings(context: ExportContext) -> Settings:
     if scene.world is not None:
         settings.ao_distance = scene.world.light_settings.distance
     return replace(settings, **command_line.current())
+
+
+def report_of(scene: Any) -> str:
+    """The file of the scene's last report."""
+    return str(folder_of(scene) / "report.json")
 
 
 def _seed(scene: Any) -> int:

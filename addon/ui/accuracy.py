@@ -6,9 +6,8 @@ from typing import Any
 
 import bpy
 import bpy.utils.previews
-from luch import ledger
 from luch.accuracy import percent
-from luch.record import ENDS, verdict
+from luch.record import ENDS, notes, verdict
 
 from .. import engine
 from .panels import LuchPanel
@@ -34,7 +33,7 @@ def rows(stats: dict[str, Any]) -> list[str]:
     lines.append(f"{stats['samples']} samples, {stats['render_seconds']:.1f} s")
     if stats.get("stopped_by") in ENDS:
         lines[-1] += f": {ENDS[stats['stopped_by']]}"
-    lines += ledger.lines(stats)
+    lines += notes(stats)
     if "verified" in stats:
         lines.append(verdict(stats["verified"]).capitalize())
     return lines

@@ -41,12 +41,17 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
     bl_label = "Sampling"
 
     def draw(self, context: Any) -> None:
+        scene = context.scene
+        draw_settings(self.layout, scene, "quality")
+        custom = scene.luch.quality == "CUSTOM"
+        if not custom:
+            draw_settings(self.layout, scene, "quality_by_report")
         draw_settings(
             self.layout,
-            context.scene,
-            "samples",
+            scene,
+            *(("samples",) if custom else ()),
             "time_limit",
-            "error_limit_percent",
+            *(("error_limit_percent", "use_denoising") if custom else ()),
             "verify",
             "seed",
             "use_animated_seed",

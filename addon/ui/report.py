@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import bpy
 
 from .. import engine
 from ..report import clock
-from ..report_job import ReportJob
+from ..report_job import ReportJob, file_name, folder_of
 from .accuracy import LUCH_RENDER_PT_accuracy
 from .effects import letters_across
 from .panels import LuchPanel
@@ -25,21 +24,11 @@ results: dict[str, tuple[list[str], Path]] = {}
 _of_scene = ""
 
 
-def folder_of(scene: Any) -> Path:
-    """Where the report of a scene goes."""
-    path = scene.luch.report_folder
-    if path.startswith("//") and not bpy.data.filepath:
-        return Path(bpy.app.tempdir) / "luch_report"
-    stem = re.sub(r"[^\w.-]+", "_", f"{Path(bpy.data.filepath).stem}_{scene.name}".strip("_"))
-    return Path(bpy.path.abspath(path)) / stem
-
-
 def start(scene: Any, view_layer: Any) -> ReportJob:
     """Exports the scene and starts the process. Raises RuntimeError or OSError with the reason."""
     global job, _of_scene
     captured = engine.capture_scene(scene, view_layer)
-    name = re.sub(r"[^\w.-]+", "_", scene.name if not bpy.data.filepath else Path(bpy.data.filepath).stem)
-    job, _of_scene = ReportJob(captured, folder_of(scene), scene.luch.report_seconds, name), scene.name
+    job, _of_scene = ReportJob(captured, folder_of(scene), scene.luch.report_seconds, file_name(scene)), scene.name
     return job
 
 

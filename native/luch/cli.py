@@ -20,7 +20,7 @@ from luch.cuda import DeviceError
 from luch.effects import effects_of
 from luch.scene import Scene
 from luch.scenefile import read_scene
-from luch.stopping import UNLIMITED_SAMPLES
+from luch.stopping import CUSTOM, STEPS, UNLIMITED_SAMPLES
 
 if TYPE_CHECKING:
     from luch.render import Progress
@@ -55,6 +55,14 @@ def _parser() -> argparse.ArgumentParser:
         metavar="E",
         help="stop when the picture's error is that small, e.g. 0.01; without --samples, however many samples it takes",
     )
+    render.add_argument(
+        "--quality",
+        type=str.upper,
+        choices=tuple(STEPS),
+        help="one dial: an error, and the settings that reach it soonest on this scene; --time still holds",
+    )
+    render.add_argument("--report", type=Path, metavar="PATH", help="a report.json that --quality chooses by")
+    render.add_argument("--denoise", action="store_true", default=None, help="Combined through Open Image Denoise")
     render.add_argument("--seed", type=int, help="seed of the sampler")
     render.add_argument("--first-sample", type=int, metavar="N", help="leave out N samples that another render takes")
     render.add_argument(
@@ -207,6 +215,14 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
     settings = scene.settings
     if options.error is not None:
         settings.error_limit, settings.samples = options.error, UNLIMITED_SAMPLES
+    if options.error is not None or options.samples is not None:
+        settings.quality = CUSTOM  # a dial in the file gives way
+    if options.quality is not None:
+        settings.quality = options.quality
+    if options.report is not None:
+        settings.quality_report = str(options.report)
+    if options.denoise is not None:
+        settings.denoise = options.denoise
     if options.samples is not None:
         settings.samples = options.samples
     if options.first_sample is not None:

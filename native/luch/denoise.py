@@ -14,19 +14,30 @@ import importlib.util
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from luch.scene import F32
+from luch.scene import F32, Scene
+
+if TYPE_CHECKING:
+    from luch.render import Progress, Result
+
+    Render = Callable[..., Result]
+    Watch = Callable[[Progress], bool]
 
 NAME = "libOpenImageDenoise.so.2"
 REMEDY = "Blender carries it; without Blender, install the package `pyoidn` or name the library in LUCH_OIDN"
 _FLOAT3, _CPU = 3, 1  # OIDN_FORMAT_FLOAT3, OIDN_DEVICE_TYPE_CPU
 _LESS, _MORE = 64, 384  # pixels along an edge of the pictures that seconds are measured on
 ALBEDO_PASS, NORMAL_PASS = "Denoising Albedo", "Denoising Normal"
+
+
+class OidnError(RuntimeError):
+    """The library's own words."""
 
 
 def _places() -> Iterator[str]:
@@ -87,7 +98,7 @@ def available() -> bool:
 
 def denoise(combined: F32, albedo: F32 | None = None, normal: F32 | None = None) -> F32:
     """Combined (H, W, 3 or 4) with less noise; alpha stays. albedo, normal (H, W, 3): of what the camera sees, both or
-    none. Raises ImportError where there is no library, RuntimeError with its own words where it fails."""
+    none. Raises ImportError where there is no library, OidnError where it fails."""
     oidn = library()
     color = np.ascontiguousarray(combined[..., :3], dtype=np.float32)
     images = {"color": color, "output": np.zeros_like(color)}
@@ -114,6 +125,35 @@ def denoise(combined: F32, albedo: F32 | None = None, normal: F32 | None = None)
     return result
 
 
+def rendered(scene: Scene, render: Render, progress: Watch | None) -> Result:
+    """What `render` makes of the scene, denoised: Combined alone, every other pass as it is. The error that a render
+    tells is that of its picture before; statistics hold "denoised". Without the library the picture stays as it is, and a
+    warning says why. A time limit covers the filter, too."""
+    settings, film = scene.settings, scene.film
+    guides = [name for name in (ALBEDO_PASS, NORMAL_PASS) if name not in film.passes]
+    traced = replace(scene, settings=replace(settings, denoise=False))
+    try:
+        library()
+        x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
+        if settings.time_limit > 0.0:
+            traced.settings.time_limit = max(1e-3, settings.time_limit - seconds_for((x1 - x0) * (y1 - y0)))
+        traced = replace(traced, film=replace(film, passes=[*film.passes, *guides]))
+        result = render(traced, progress=progress)
+        began = time.perf_counter()
+        if not result.cancelled:
+            passes = result.passes
+            passes["Combined"] = denoise(passes["Combined"], passes[ALBEDO_PASS], passes[NORMAL_PASS])
+            took = time.perf_counter() - began
+            result.stats.update(denoised=True, denoise_seconds=took, time_asked=settings.time_limit,
+                                total_seconds=result.stats["total_seconds"] + took)  # fmt: skip
+        for name in guides:
+            result.passes.pop(name, None)
+    except (ImportError, OidnError) as error:
+        result = render(traced, progress=progress)
+        result.stats["warnings"] = [*result.stats["warnings"], f"The picture is not denoised: {error}."]
+    return result
+
+
 def seconds_for(pixels: int) -> float:
     """What denoising a picture of so many pixels takes here: measured on two smaller ones."""
     took = []
@@ -129,4 +169,4 @@ def seconds_for(pixels: int) -> float:
 def _check(oidn: ctypes.CDLL, device: int) -> None:
     words = ctypes.c_char_p()
     if oidn.oidnGetDeviceError(device, ctypes.byref(words)) != 0:
-        raise RuntimeError(f"Open Image Denoise: {(words.value or b'failed').decode(errors='replace')}")
+        raise OidnError(f"Open Image Denoise: {(words.value or b'failed').decode(errors='replace')}")

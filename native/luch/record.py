@@ -29,10 +29,18 @@ def line(stats: Mapping[str, Any]) -> str:
         text += f", {describe(stats)}"
     if stats.get("stopped_by") in ENDS:
         text += f"; {ENDS[stats['stopped_by']]}"
-    text += "".join(f"; {taken[0].lower()}{taken[1:]}" for taken in ledger.lines(stats))
+    text += "".join(f"; {note[0].lower()}{note[1:]}" for note in notes(stats))
     if "verified" in stats:
         text += f"; {verdict(stats['verified'])}"
     return text
+
+
+def notes(stats: Mapping[str, Any]) -> list[str]:
+    """What else a reader of the error should know, one sentence each."""
+    told = [stats["quality"]["reason"]] if "quality" in stats else []
+    if stats.get("denoised"):
+        told.append("Denoised: the error is that of the picture before")
+    return told + ledger.lines(stats)
 
 
 def verdict(found: Mapping[str, Any]) -> str:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from luch import accuracy, ledger
+from luch import accuracy, denoise, ledger
 from luch._native import core
 from luch.check import check_scene
 from luch.curve import Curve, Forecast, correction, next_target
@@ -25,7 +25,7 @@ from luch.effects import effects_of
 from luch.effects.removal import without
 from luch.merge import Sums
 from luch.scene import F32, Film, Scene, Settings
-from luch.stopping import Stopping
+from luch.stopping import CUSTOM, Stopping
 from luch.watching import watched
 
 # Steps grow until one takes about this long; longer steps show the picture too seldom.
@@ -72,7 +72,8 @@ class Result:
     sums: Sums | None = None  # for luch.merge, if Settings.mergeable
 
 
-def _preparing(total: int, start: float) -> Progress:
+def preparing(total: int, start: float) -> Progress:
+    """What is told before the first sample."""
     seconds = time.perf_counter() - start
     return Progress(0, total, 0.0, seconds, float("inf"), peak_memory_bytes(), False, dict, preparing=True)
 
@@ -124,6 +125,8 @@ class _Loop:
         self.cancelled = self.timed_out = False
         pixels = film_pixels(scene.film)
         self._look_cost = LOOK_SECONDS * pixels / max(1, os.cpu_count() or 1) if settings.estimate_error else 0.0
+        # Of this thread alone: what other work on the machine adds to the wall's clock must not put off the next look.
+        self._look_busy = self._look_cost
         self._passes_cost = PASS_SECONDS * pixels * (4 + 3 * len(scene.film.passes))
 
     @property
@@ -135,7 +138,7 @@ class _Loop:
         """Structures and lights."""
 
         def goes_on() -> bool:
-            return self.progress is None or self.progress(_preparing(self.stopping.samples, self.start))
+            return self.progress is None or self.progress(preparing(self.stopping.samples, self.start))
 
         self.cancelled = not watched(self.renderer.prepare, self.renderer, goes_on)
         self.prepared = time.perf_counter()
@@ -184,14 +187,15 @@ class _Loop:
         allowed = LOOK_SHARE * self.seconds
         if self.settings.error_limit > 0.0:
             allowed = max(allowed, QUICK_LOOK_SECONDS)
-        due = self.done == self.stopping.next_look(self.done - 1) and self._look_cost <= allowed
+        due = self.done == self.stopping.next_look(self.done - 1) and self._look_busy <= allowed
         asked = self.done == self.stopping.settled
         if not self.settings.estimate_error or not (last or due or asked):
             return
-        began = time.perf_counter()
+        began, busy = time.perf_counter(), time.thread_time()
         mean, deviation, share = self.renderer.deviations()
         found = accuracy.estimate(mean, deviation)
         self._look_cost = time.perf_counter() - began
+        self._look_busy = time.thread_time() - busy
         if found is not None:
             self.curve.add(self.done, self.seconds, found, share)
             self.stopping.look(self.curve)
@@ -251,6 +255,12 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     and the film so far is returned (``Result.cancelled``). Raises ValueError for a scene that does not
     fit together, naming the object.
     """
+    if scene.settings.quality != CUSTOM:
+        from luch import quality
+
+        return quality.rendered(scene, render, progress)
+    if scene.settings.denoise:
+        return denoise.rendered(scene, render, progress)
     if scene.settings.verify:
         from luch.verify import render_verified
 

@@ -312,6 +312,10 @@ class Settings:
     without_effects: list[str] = field(default_factory=list)
     force_effects: list[str] = field(default_factory=list)
     estimate_error: bool = True  # keep marks in the film, whose differences tell the picture's error
+    denoise: bool = False  # Combined goes through Open Image Denoise (luch.denoise)
+    # One dial instead of the above (luch.quality): "CUSTOM" leaves them, the others choose on the scene's own curve.
+    quality: str = "CUSTOM"
+    quality_report: str = ""  # a report.json that the dial chooses by; "": a pilot before the render
     ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
 
 

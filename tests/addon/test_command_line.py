@@ -32,7 +32,15 @@ def test_effects_are_left_out_and_forced_by_name() -> None:
 
 def test_an_error_is_asked_for_with_as_many_samples_as_it_takes() -> None:
     words = ("blender", "--", "--luch-error", "0.01", "--luch-time", "600")
-    assert overrides(words) == {"error_limit": 0.01, "time_limit": 600.0, "samples": 65536}
+    assert overrides(words) == {"error_limit": 0.01, "time_limit": 600.0, "samples": 65536, "quality": "CUSTOM"}
     assert overrides((*words, "--luch-samples", "128"))["samples"] == 128
     with pytest.raises(CommandLineError, match="--luch-error"):
         overrides(("blender", "--", "--luch-error", "-1"))
+
+
+def test_the_dial_and_denoising_can_be_asked_for_and_an_error_overrules_a_dial() -> None:
+    assert overrides(("blender", "--", "--luch-quality", "good", "--luch-denoise")) == {
+        "quality": "GOOD", "denoise": True,
+    }  # fmt: skip
+    assert overrides(("blender", "--", "--luch-error", "0.02"))["quality"] == "CUSTOM"
+    assert overrides(("blender", "--", "--luch-samples", "4", "--luch-quality", "HIGH"))["quality"] == "HIGH"

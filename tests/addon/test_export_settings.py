@@ -191,3 +191,13 @@ def test_samples_of_the_view_layer_win(scene: bpy.types.Scene) -> None:
     scene.luch.samples = 10
     scene.view_layers[0].samples = 4
     assert export().settings.samples == 4
+
+
+def test_the_dial_and_denoising_reach_the_renderer(scene: bpy.types.Scene) -> None:
+    add_camera(scene)
+    scene.cycles.use_denoising = True  # as a file that was set up for Cycles
+    assert (export().settings.denoise, export().settings.quality) == (True, "CUSTOM")
+    scene.luch.use_denoising, scene.luch.quality, scene.luch.quality_by_report = False, "GOOD", True
+    settings = export().settings
+    assert (settings.denoise, settings.quality) == (False, "GOOD")
+    assert settings.quality_report.endswith("report.json")

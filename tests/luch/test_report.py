@@ -272,7 +272,7 @@ def test_sentences_say_what_is_best_what_stays_and_what_effects_cost() -> None:
         "where the scene as it is set has 19 %; it never goes under 1.0 %."
     )
     assert any("the error never goes under 3.0 %" in line and "1111 samples" in line for line in told)
-    assert any(line.startswith("Caustics: 61 % (60 to 62) of the cost; leaving it out changes the picture by 0.30 %")
+    assert any(line.startswith("Caustics: 61 % (60 to 62) of the cost; left out, the picture changes by 0.30 %")
                for line in told)  # fmt: skip
     assert any(line.startswith("Caustics could be left out: 61 % less time") for line in told)
 

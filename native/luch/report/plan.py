@@ -86,6 +86,7 @@ def plan(scene: Scene, effects: Effects, accelerator: str = "", triangles: int =
     absent = [
         "Integrators: path tracing with next event estimation is the only one.",
         "Samplers: the Owen-scrambled Sobol sequence is the only one.",
+        "Adaptive sampling: it acts only on renders that end by an error.",
     ]
     variants.append(Variant(EXACT, "Settings", "takes nothing from the light: what the others are held against",
                             exact_settings(settings), rank=0))  # fmt: skip

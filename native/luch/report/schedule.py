@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from luch import denoise
+from luch.accuracy import NORMAL_95
 from luch.effects import effects_of
 from luch.render import film_pixels
 from luch.report.plan import AS_SET, EXACT, Plan, Variant, plan
 from luch.report.results import Point, Report, Row
 from luch.report.shots import GoesOn, Shot, scaled, shoot, size_of
 from luch.report.tally import (
-    Measured,
     Tally,
     brightness_of,
     fit_errors,
@@ -48,7 +48,6 @@ ANCHOR_EVERY = 6  # renders, between two of the scene as it is set
 AVERAGE_COST = 1.3  # of all ways to render, over the scene as it is set
 REFERENCE_SEEDS = (0x5EED0001, 0x5EED0002)
 FIRST_SEED = 1000
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -82,17 +81,21 @@ class Cancelled(Exception):
 
 
 class Session:
-    """One report while it is made."""
+    """One report while it is made. only: which variants. rounds: at most. patience: it is planned for its seconds, and
+    may take so many times as long where the machine turns out slower."""
 
     def __init__(self, scene: Scene, seconds: float, watch: Watch | None, only: Callable[[Variant], bool] | None = None,
-                 size: int = 0) -> None:  # fmt: skip
+                 *, size: int = 0, rounds: int = MOST_ROUNDS, patience: float = 1.0) -> None:  # fmt: skip
         if not seconds > 0.0:
             raise ValueError(f"A report needs time: {seconds:g} seconds were given.")
         self.scene, self.seconds, self._watch, self._only, self._size = scene, seconds, watch, only, size
+        self._rounds, self._patience = rounds, patience
         self.start = time.perf_counter()
         self.cancelled = False
         self._doing = "pilot"
         self._denoise_seconds = 0.0
+        self._ratio_spread = 0.0  # of the logarithm of one ratio of times, over all variants
+        self._unmeasured: list[str] = []
         self._wide_margin = WRITING_SECONDS if seconds > 10.0 * WRITING_SECONDS else WRITING_SHARE * seconds
 
     # -- time -------------------------------------------------------------------------------------
@@ -107,7 +110,7 @@ class Session:
         return self.seconds - self._wide_margin - self.spent
 
     def _goes_on(self) -> bool:
-        if self.left <= 0.0:
+        if self.left + (self._patience - 1.0) * self.seconds <= 0.0:
             return False
         if self._watch is not None and not self._watch(
             Told(self._doing, min(1.0, self.spent / self.seconds), self.spent, max(0.0, self.seconds - self.spent))
@@ -132,7 +135,7 @@ class Session:
         self._found = [_Found(variant) for variant in self._variants]
         rounds = 0
         try:
-            while rounds < MOST_ROUNDS:
+            while rounds < self._rounds:
                 self._render_round(rounds)
                 rounds += 1
         except Cancelled:
@@ -154,7 +157,7 @@ class Session:
                                 int(stats.get("triangles", 0)))  # fmt: skip
         self._variants = [v for v in self._plan.variants if self._only is None or self._only(v)]
         pace = shot.trace_seconds / (film_pixels(small.film) * samples)  # a path
-        self._unmeasured: list[str] = []
+        self._unmeasured = []
         if self.seconds < LEAST_SECONDS_TO_FILTER:
             self._leave_out(lambda variant: variant.denoised)
         self._filters = any(variant.denoised for variant in self._variants)
@@ -162,7 +165,7 @@ class Session:
             self._doing = "denoising, for the time"
             width, height = size_of(self.scene.film)
             self._denoise_seconds = denoise.seconds_for(width * height)
-        if self.left <= 0.0:
+        if not self._goes_on():
             raise Cancelled
         self._choose_size(pace, shot.build_seconds)
         self._drop_what_does_not_fit(pace, shot.build_seconds)
@@ -171,7 +174,7 @@ class Session:
         """The picture grows with the time; samples grow when it is large enough."""
         width, height = size_of(self.scene.film)
         renders = GOOD_ROUNDS * len(self._variants) * (1.0 + 1.0 / ANCHOR_EVERY)
-        tracing = max(0.05 * self.left, (1.0 - REFERENCE_SHARE) * self.left - renders * build)
+        tracing = max(0.05 * self.seconds, (1.0 - REFERENCE_SHARE) * self.left - renders * build)
         paths = tracing / (renders * AVERAGE_COST * pace)
         samples = 16 if paths > 16 * LEAST_SIZE**2 else LEAST_SAMPLES
         longest = self._size or math.sqrt(paths / samples * max(width, height) / min(width, height))
@@ -221,9 +224,12 @@ class Session:
         pictures: dict[str, Any] = {}
         anchor, since = 0.0, 0
         waiting: list[tuple[_Found, float]] = []
-        half = 0.5 * self.left
+        spare = (self._patience - 1.0) * self.seconds
+        half = 0.5 * (self.left + spare)
         for found in list(self._found):
-            if number == 0 and found is not self._found[0] and self.left < half:  # slower than the pilot foretold
+            if (
+                number == 0 and found is not self._found[0] and self.left + spare < half
+            ):  # slower than the pilot foretold
                 rest = self._found[self._found.index(found) :]
                 self._unmeasured = [*(late.variant.name for late in rest), *self._unmeasured]
                 self._found = self._found[: -len(rest)]
@@ -278,6 +284,9 @@ class Session:
         measured = [f for f in self._found if f.differences.count >= LEAST_ROUNDS]
         if not measured or measured[0].variant.name != EXACT:
             raise Cancelled
+        logs = [np.log(f.ratios) for f in measured if len(f.ratios) > 1]
+        if logs:  # a few ratios tell their spread badly; the machine's restlessness is that of all
+            self._ratio_spread = float(np.sqrt(np.median([np.var(found, ddof=1) for found in logs])))
         base = next((f for f in measured if f.variant.name == self._plan.base.name), measured[0])
         width, height = size_of(self._small.film)
         full_width, full_height = size_of(self.scene.film)
@@ -293,7 +302,7 @@ class Session:
 
     def _row(self, found: _Found, base: _Found) -> Row:
         variant = found.variant
-        cost, low, high = _ratio(found.ratios) if found is not base else (1.0, 1.0, 1.0)
+        cost, low, high = _ratio(found.ratios, self._ratio_spread) if found is not base else (1.0, 1.0, 1.0)
         noise = {n: noise_of(t, self._weight) for n, t in sorted(found.tallies.items()) if t.count >= LEAST_ROUNDS}
         line = fit_noise(list(noise.items()))
         # What chooses paths otherwise has no bias of its own, but where light is clamped, noise decides what is cut.
@@ -328,17 +337,14 @@ class Session:
         return shown
 
 
-def _ratio(ratios: list[float]) -> tuple[float, float, float]:
-    """Median of ratios with a 95 % interval from their spread."""
+def _ratio(ratios: list[float], spread: float) -> tuple[float, float, float]:
+    """Median of ratios with a 95 % interval. spread: of the logarithm of any ratio, at least."""
     logs = np.log(ratios)
     middle = float(np.median(logs))
     if len(logs) < 2:
         return math.exp(middle), 0.0, math.inf
-    # Few renders tell their own spread badly: Student's distribution, to second order as luch.accuracy has it.
-    few = 1.0 / (len(logs) - 1)
-    student = NORMAL_95 + (NORMAL_95**3 + NORMAL_95) / 4.0 * few
-    half = student * float(np.std(logs, ddof=1)) / math.sqrt(len(logs))
+    half = NORMAL_95 * max(spread, float(np.std(logs, ddof=1))) / math.sqrt(len(logs))
     return math.exp(middle), math.exp(middle - half), math.exp(middle + half)
 
 
-__all__ = ["Cancelled", "Measured", "Session", "Told", "Watch"]
+__all__ = ["Cancelled", "Session", "Told", "Watch"]

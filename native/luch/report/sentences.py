@@ -52,13 +52,19 @@ def best(report: Report, seconds: float) -> Row | None:
     able = [row for row in report.choices if _sampled(report, row, seconds) >= 1.0]
     if not able:
         return None
-    first = min(able, key=lambda row: row.error_at(_sampled(report, row, seconds)))
+    first = min(able, key=lambda row: _surely(row, _sampled(report, row, seconds)))
     base = report.base_row
     if base in able and base is not None:
-        gain = first.error_at(_sampled(report, first, seconds)) / base.error_at(_sampled(report, base, seconds))
-        if gain > 1.0 - WORTH:
+        own = base.error_at(_sampled(report, base, seconds))
+        if _surely(first, _sampled(report, first, seconds)) > (1.0 - WORTH) * own:
             return base
     return first
+
+
+def _surely(row: Row, samples: float) -> float:
+    """Its error, at the largest bias and the longest time that the measurement allows."""
+    bias = row.floor.high if row.biased and not row.denoised else 0.0
+    return math.hypot(bias, math.sqrt(row.line.relmse(max(samples * row.cost / row.cost_high, 1.0))))
 
 
 def _least_error(report: Report, base: Row, seconds: float) -> list[str]:
@@ -128,11 +134,11 @@ def _effects(report: Report) -> list[str]:
     for row in most[:NAMED]:
         if row.cost_share < LARGE_COST:
             continue
-        change = f"changes the picture by {percent(row.floor.error)} %" if row.floor.sure else _unchanged(row)
-        told.append(f"{row.effect.capitalize()}: {_share(row)} of the cost; leaving it out {change}.")
+        change = f"changes by {percent(row.floor.error)} %" if row.floor.sure else _unchanged(row)
+        told.append(f"{_capital(row.effect)}: {_share(row)} of the cost; left out, the picture {change}.")
     saving = [row for row in most if row.cost_low < row.cost_high < 1.0 - LARGE_COST and row.floor.high < LITTLE_CHANGE]
     for row in saving[:NAMED]:
-        told.append(f"{row.effect.capitalize()} could be left out: {100.0 * row.cost_share:.0f} % less time for less "
+        told.append(f"{_capital(row.effect)} could be left out: {100.0 * row.cost_share:.0f} % less time for less "
                     f"than {percent(row.floor.high)} % of error.")  # fmt: skip
     return told
 
@@ -140,6 +146,11 @@ def _effects(report: Report) -> list[str]:
 def _share(row: Row) -> str:
     low, high = 1.0 - row.cost_high, 1.0 - row.cost_low
     return f"{100.0 * row.cost_share:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def _capital(text: str) -> str:
+    """AOVs stay AOVs."""
+    return text[:1].upper() + text[1:]
 
 
 def _unchanged(row: Row) -> str:

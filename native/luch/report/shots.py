@@ -43,7 +43,7 @@ def scaled(scene: Scene, longest: int) -> Scene:
         border = (x0, y0, max(x1, x0 + 1), max(y1, y0 + 1))
     small = replace(film, width=max(1, round(film.width * factor)), height=max(1, round(film.height * factor)),
                     border=border, passes=[name for name in film.passes if name != "Error"])  # fmt: skip
-    settings = replace(scene.settings, time_limit=0.0, error_limit=0.0, estimate_error=False, verify=False,
+    settings = replace(scene.settings, quality="CUSTOM", denoise=False, time_limit=0.0, error_limit=0.0, estimate_error=False, verify=False,
                        mergeable=False, first_sample=0, samples_in_all=0)  # fmt: skip
     return replace(scene, film=small, settings=settings)
 
