@@ -6,16 +6,18 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from luch import record
 from luch.scene import Scene
 
 from . import passes
-from .export.cache import MeshCache
 from .report import Reporter, describe_error
 from .result import ResultWriter
+
+if TYPE_CHECKING:
+    from .export.cache import MeshCache  # loads the core: not while Blender starts
 
 # Statistics of the last render of each scene, by its name: what panels, scripts and tests read.
 last_stats: dict[str, dict[str, Any]] = {}
@@ -48,7 +50,7 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         through here would count as a finished render, or crash Blender when it saves the file."""
         try:
             self._render(depsgraph)
-        except (Exception, KeyboardInterrupt) as error:
+        except BaseException as error:  # of scripts in drivers and handlers too: SystemExit would end Blender
             traceback.print_exc()
             self.report({"ERROR"}, describe_error(error))
 
@@ -78,6 +80,8 @@ class LuchRenderEngine(bpy.types.RenderEngine):
 
     def _mesh_cache(self, depsgraph: Any) -> MeshCache:
         """The view layer's meshes of the frame before, if the user wants them kept; Blender then keeps this engine."""
+        from .export.cache import MeshCache
+
         if not depsgraph.scene.render.use_persistent_data:
             return MeshCache()
         if not hasattr(self, "_caches"):

@@ -131,8 +131,17 @@ def describe_error(error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "Luch: the render was interrupted."
     if isinstance(error, MemoryError):
+        if "bytes" in str(error):  # luch.memory says how many, and what to do
+            return f"Luch: {error}"
         return "Luch: there is not enough memory for this scene. Lower the resolution or simplify the scene."
     if isinstance(error, ImportError):
         return f"Luch: its ray tracing core cannot be loaded ({error}). Install the extension again."
-    text = " ".join(str(error).split()) or type(error).__name__
+    text = " ".join(_text_of(error).split()) or type(error).__name__
     return f"Luch: {text}" if isinstance(error, ValueError) else f"Luch: {text} ({type(error).__name__})"
+
+
+def _text_of(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:  # an exception of others may be broken itself: its name will do
+        return ""

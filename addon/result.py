@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from luch import cryptomatte, effects
+from luch import cryptomatte
 from luch.scene import F32, Film, Scene
 
 
@@ -49,6 +49,8 @@ class ResultWriter:
 
     def stamp(self, stats: Mapping[str, Any], scene: Scene) -> None:
         """Write statistics and cryptomatte manifests into the file's metadata. After the result has ended."""
+        from luch import effects  # loads the core: not while Blender starts
+
         final = self._engine.get_result()
         if final is None:
             return

@@ -1,5 +1,8 @@
 """Chooses the compiled core for this processor: AVX-512 (v4), AVX2 (v3) or plain x86-64 (v2).
 
+It is loaded when something of it is asked for, not before: Blender starts without that time, and where the core is
+missing or of another Python the add-on still registers, and a render can tell why it fails.
+
 ``LUCH_ISA=v2|v3|v4`` in the environment overrides the choice.
 """
 
@@ -8,6 +11,7 @@ from __future__ import annotations
 import importlib
 import os
 from types import ModuleType
+from typing import Any
 
 _NEEDS = {
     "v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
@@ -40,4 +44,15 @@ def _load() -> ModuleType:
     raise ImportError("Luch's compiled core is missing; run `python3 build.py build`. " + "; ".join(errors))
 
 
-core = _load()
+class _Core:
+    """The compiled module, as soon as one of its names is asked for. Raises ImportError where there is none."""
+
+    def __getattr__(self, name: str) -> Any:
+        self.__dict__.update(vars(_load()))  # from now on Python finds names without asking here
+        try:
+            return self.__dict__[name]
+        except KeyError:
+            raise AttributeError(f"Luch's compiled core has no {name!r}.") from None
+
+
+core = _Core()

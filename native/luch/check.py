@@ -23,6 +23,8 @@ MOST_CRYPTOMATTE = 64
 LARGEST_PIXEL_ASPECT = 1e6
 MOST_SAMPLES = 1 << 31
 FLOAT32_MAX = float(np.finfo(np.float32).max)
+# Of all meshes together. A structure counts primitives in 30 bits, views count rows and numbers in 32.
+_MOST = {"primitives": (1 << 30) - 1, "vertices": (1 << 32) // 3, "numbers of attributes": (1 << 32) - 1}
 _TILED = 2  # ImageFlag of shade/textures/image_nodes.h
 _SKY_ROWS, _SKY_COLUMNS = 256, 256  # SkyAtmosphere of shade/textures/sky.h: half the circle
 _AGAIN = "Export the scene again."
@@ -42,6 +44,7 @@ def check_scene(scene: Scene) -> None:
     """Raises ValueError, with one sentence that names the owner, for a scene whose parts do not fit together."""
     _check_film(scene.film)
     _check_settings(scene.settings)
+    _check_sizes(scene)
     for material in scene.materials:
         _check_program(f'Material "{material.name}"', material.surface, scene)
     for light in scene.lights:
@@ -81,6 +84,23 @@ def _check_settings(settings: Settings) -> None:
         value = getattr(settings, name)
         if not 0 <= value <= most:
             raise ValueError(f"Settings: {name} is {value}. Choose a number up to {most}.")
+
+
+def _check_sizes(scene: Scene) -> None:
+    """The core counts in 32 bits: what is more would wrap around. Nothing is read here but the shapes of arrays."""
+    totals = dict.fromkeys(("primitives", "vertices", "numbers of attributes"), 0)
+    for mesh in scene.meshes:
+        primitives = len(mesh.triangles) + (0 if mesh.spheres is None else len(mesh.spheres))
+        primitives += 0 if mesh.curves is None else len(mesh.curves.points)  # at least
+        keys = 1 if mesh.motion_positions is None else len(mesh.motion_positions) + 1
+        sizes = primitives, keys * len(mesh.positions), sum(a.data.size for a in mesh.attributes.values())
+        for (what, most), count in zip(_MOST.items(), sizes, strict=True):
+            totals[what] += count
+            if totals[what] > most:
+                raise ValueError(
+                    f'Mesh "{mesh.name}": with it the scene has {totals[what]} {what}, more than the {most} that Luch'
+                    " can count. Simplify the scene, or share meshes between instances."
+                )
 
 
 def _check_object(item: Object, meshes: int, materials: int) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 from luch import ledger
 from luch.accuracy import percent
 from luch.curve import describe
-from luch.effects import summary
 
 # Why a render ended, as people read it.
 ENDS = {
@@ -51,6 +50,8 @@ def verdict(found: Mapping[str, Any]) -> str:
 
 def header_fields(stats: Mapping[str, Any]) -> dict[str, str | int | float]:
     """Statistics as header fields of a picture: plain values as they are, others as JSON."""
+    from luch.effects import summary  # loads the core: not while Blender starts
+
     fields: dict[str, str | int | float] = {}
     for key, value in stats.items():
         if key == "effects":  # their reasons would outweigh all the rest

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from luch import accuracy, denoise, ledger
+from luch import accuracy, denoise, ledger, memory
 from luch._native import core
 from luch.check import check_scene
+from luch.cuda.device import faults_told
 from luch.curve import Curve, Forecast, correction, next_target
 from luch.effects import effects_of
 from luch.effects.removal import without
@@ -253,7 +254,8 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
 
     progress is called about ten times a second and at the end of every step; returning False cancels,
     and the film so far is returned (``Result.cancelled``). Raises ValueError for a scene that does not
-    fit together, naming the object.
+    fit together, naming the object, MemoryError with the bytes it would take where there are fewer,
+    luch.cuda.DeviceError for a GPU that fails while it renders.
     """
     if scene.settings.quality != CUSTOM:
         from luch import quality
@@ -275,10 +277,14 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     if wants_error or settings.error_limit > 0.0 or settings.mergeable:
         settings = replace(settings, estimate_error=True)
     traced = replace(scene, film=replace(scene.film, passes=own), settings=settings)
-    renderer, warnings = _renderer_for(traced)
-    loop = _Loop(renderer, scene, settings, progress, start)
-    loop.prepare()
-    loop.run()
+    memory.require(traced)
+    with memory.explained(traced), faults_told():
+        renderer, warnings = _renderer_for(traced)
+        memory.require(traced, renderer.stats()["film_pixel_bytes"] + memory.READ_PIXEL_BYTES)
+        loop = _Loop(renderer, scene, settings, progress, start)
+        loop.prepare()
+        loop.run()
+        passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
     stats = dict(renderer.stats())
     stats.update(
         samples=loop.done,
@@ -297,7 +303,6 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         warnings=[*scene.warnings, *warnings, *getattr(renderer, "warnings", [])],
         effects=effects,
     )
-    passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
     stats.update(ledger.shares(stats, passes["Combined"], scene.film.exposure))
     stats.update(loop.curve.statistics())
     if wants_error:

@@ -130,6 +130,7 @@ def test_borders_are_cut_where_blender_cuts_them(room: bpy.types.Scene) -> None:
         assert bpy.ops.render.render() == {"FINISHED"}
 
 
+@pytest.mark.promise(22)
 @pytest.mark.parametrize("size", [(4, 4), (5, 17)])
 def test_tiny_frames_render(room: bpy.types.Scene, size: tuple[int, int]) -> None:
     room.render.resolution_x, room.render.resolution_y = size
@@ -289,6 +290,7 @@ ERRORS = (
 )
 
 
+@pytest.mark.promise(1)
 @pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
 def test_whatever_fails_becomes_an_error_and_the_next_render_works(

@@ -91,6 +91,7 @@ def test_a_generated_image_has_its_pixels(context: ExportContext) -> None:
     assert export(context, image).pixels[0, 0].tolist() == [0, 255, 0, 255]
 
 
+@pytest.mark.promise(13)
 @pytest.mark.parametrize("contents", [None, b"", b"not a picture", b"\x89PNG\r\n\x1a\n\0\0\0"])
 def test_a_missing_or_corrupt_image_is_magenta_and_named_once(
     context: ExportContext, tmp_path: Path, contents: bytes | None

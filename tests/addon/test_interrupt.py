@@ -9,6 +9,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 # SIGINT is set anew: a process started in the background of a script inherits it ignored. The time limit
@@ -33,6 +35,7 @@ print("again:", bpy.ops.render.render(), flush=True)
 """
 
 
+@pytest.mark.promise(3)
 def test_an_interrupt_ends_the_render_within_two_seconds_and_not_the_process() -> None:
     paths = [str(ROOT), str(ROOT / "native"), *filter(None, [os.environ.get("PYTHONPATH")])]
     with subprocess.Popen(

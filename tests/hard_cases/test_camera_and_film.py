@@ -167,6 +167,7 @@ def test_64_light_beyond_the_float_range_never_enters() -> None:
     assert np.isfinite(result.passes["Combined"]).all()
 
 
+@pytest.mark.promise(12)
 def test_the_picture_does_not_depend_on_the_number_of_threads() -> None:
     scene = with_wall(furnace(Camera(use_dof=True, fstop=0.1), Film(width=70, height=50), samples=3), -30.0, 5.0)
     pictures = []

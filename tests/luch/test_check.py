@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
+import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,11 +14,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from luch import memory
+from luch.cuda import DeviceError
 from luch.render import render
-from luch.scene import Image, Instances, Scene
+from luch.scene import Attribute, Image, Instances, Mesh, Scene
 from luch.scenefile import HEADER, SceneFileError, read_scene, write_scene
 from luch.shader import ProgramBuilder
 from luch.shader_code import OPS
+from luch.watching import watched
 from support.effects import program
 from support.everything import everything
 
@@ -176,3 +183,101 @@ def test_arrays_are_read_as_they_were_written(file: Path) -> None:
     again.meshes[0].positions[0] = 0.0  # not a view of read-only bytes
     assert replace(again.settings) == scene.settings
     np.testing.assert_array_equal(again.meshes[1].positions, scene.meshes[1].positions)
+
+
+def vast_mesh(**sizes: int) -> Mesh:
+    """A mesh of any size that takes no memory: all rows are one."""
+    count = sizes.get("triangles", 1)
+    mesh = Mesh(
+        "Vast",
+        np.broadcast_to(np.zeros(3, np.float32), (sizes.get("vertices", 3), 3)),
+        np.broadcast_to(np.zeros(3, np.uint32), (count, 3)),
+        np.broadcast_to(np.zeros(1, np.uint16), (1, count))[0],
+    )
+    if "corners" in sizes:
+        mesh.attributes["UVMap"] = Attribute(np.broadcast_to(np.zeros(2, np.float32), (sizes["corners"], 2)), "CORNER")
+    return mesh
+
+
+@pytest.mark.promise(20)
+@pytest.mark.parametrize(
+    ("sizes", "told"),
+    [({"triangles": 1 << 30}, "primitives"), ({"vertices": 1 << 31}, "vertices"), ({"corners": 1 << 31}, "numbers of")],
+)
+def test_what_the_core_cannot_count_is_refused_before_it_is_copied(sizes: dict[str, int], told: str) -> None:
+    scene = everything()
+    scene.meshes.append(vast_mesh(**sizes))
+    with pytest.raises(ValueError, match=f'Mesh "Vast": with it the scene has .*{told}'):
+        render(scene)
+
+
+@pytest.mark.promise(20)
+def test_a_mesh_of_fifty_million_triangles_is_refused_where_it_does_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = everything()
+    scene.meshes.append(vast_mesh(triangles=50_000_000, vertices=25_000_000))
+    monkeypatch.setattr(memory, "available_bytes", lambda: float(1 << 29))
+    with pytest.raises(MemoryError, match=r"at least 0\.9\d GiB \(\d+ bytes\).*0\.50 GiB are free"):
+        render(scene)
+
+
+@pytest.mark.promise(7)
+def test_a_picture_that_does_not_fit_is_refused_before_it_is_allocated() -> None:
+    scene = everything()
+    scene.film.width = scene.film.height = 60_000
+    with pytest.raises(MemoryError, match=r"at least .*60000 x 60000 pixels \d+\.\d+, geometry"):
+        render(scene)
+
+
+@pytest.mark.promise(7)
+def test_an_allocation_that_fails_says_what_was_wanted_and_a_gpus_keeps_its_own_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class OutOfMemoryError(MemoryError):
+        """As CuPy raises it."""
+
+    def failing(error: MemoryError) -> Callable[[object], None]:
+        def prepare(loop: object) -> None:
+            raise error
+
+        return prepare
+
+    monkeypatch.setattr("luch.render._Loop.prepare", failing(MemoryError("std::bad_alloc")))
+    with pytest.raises(MemoryError, match=r"needs more than .* bytes\)"):
+        render(everything())
+    OutOfMemoryError.__module__ = "cupy.cuda.memory"
+    monkeypatch.setattr("luch.render._Loop.prepare", failing(OutOfMemoryError("allocating 5,368,709,120 bytes")))
+    with pytest.raises(DeviceError, match=r"5,368,709,120 bytes.*Lower the resolution"):
+        render(everything())
+    monkeypatch.undo()
+    assert np.isfinite(render(everything()).passes["Combined"]).all()
+
+
+@pytest.mark.promise(2)
+def test_an_exception_of_another_thread_arrives_where_it_was_waited_for() -> None:
+    class Silent:
+        def cancel(self) -> None:
+            """Nothing runs."""
+
+    def work() -> None:
+        raise ZeroDivisionError("in the worker")
+
+    with pytest.raises(ZeroDivisionError, match="in the worker"):
+        watched(work, Silent(), lambda: True)
+
+
+@pytest.mark.promise(11)
+def test_two_processes_at_once_draw_what_one_draws(tmp_path: Path) -> None:
+    write_scene(everything(), tmp_path / "scene.luch")
+    script = (
+        "import sys, hashlib; from luch.render import render; from luch.scenefile import read_scene\n"
+        "scene = read_scene(sys.argv[1]); scene.settings.samples, scene.settings.threads = 256, 0\n"
+        "print(hashlib.sha256(render(scene).passes['Combined'].tobytes()).hexdigest())"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path / "scene.luch")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) for _ in range(2)]
+    seen = [process.communicate(timeout=60)[0] for process in both]
+    assert seen[0] == seen[1] != ""
+    scene = read_scene(tmp_path / "scene.luch")
+    scene.settings.samples = 256
+    assert seen[0].strip() == hashlib.sha256(render(scene).passes["Combined"].tobytes()).hexdigest()

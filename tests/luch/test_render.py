@@ -87,6 +87,7 @@ def test_an_unknown_structure_is_refused_by_name() -> None:
         render(scene)
 
 
+@pytest.mark.promise(4)
 def test_a_cancel_while_structures_are_built_ends_the_building() -> None:
     told: list[Progress] = []
 
@@ -112,6 +113,7 @@ def test_a_render_that_goes_on_is_told_of_building_then_of_samples() -> None:
     assert told[-1].samples == 4
 
 
+@pytest.mark.promise(5)
 def test_without_a_gpu_the_cpu_goes_on_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cupy", None)  # as where it is not installed
     device.cupy.cache_clear()

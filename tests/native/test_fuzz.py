@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from fuzz.runner import KINDS, fuzz
 
 SEEDS = 40
@@ -10,6 +11,7 @@ LONGEST_S = 12.0  # under a sanitizer fewer seeds must do
 FEWEST_CASES = 24
 
 
+@pytest.mark.promise(24)
 def test_random_scenes_and_damaged_files_render_finite_or_are_refused_by_name() -> None:
     summary = fuzz(LONGEST_S, FIRST_SEED, SEEDS)
     assert summary.findings == []

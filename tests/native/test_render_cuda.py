@@ -111,6 +111,7 @@ def test_a_cancel_keeps_the_samples_so_far(place: str) -> None:
     assert result.passes["Combined"][..., :3].mean() > 0.01
 
 
+@pytest.mark.promise(7)
 def test_too_little_memory_is_told_with_its_remedy(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
     monkeypatch.setattr(device_render, "MEMORY_SHARE", 1e-9)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 import functools
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 OLDEST = 75  # compute capability 7.5: Turing
@@ -42,6 +43,37 @@ def cupy() -> Any:
 def architecture_of(module: Any) -> int:
     """Compute capability of CuPy's current device, as 75 for 7.5."""
     return int(module.cuda.Device().compute_capability)
+
+
+# What a GPU said when it failed while it rendered: its context is lost then, for as long as this process lives.
+_lost: list[str] = []
+
+
+@contextmanager
+def faults_told() -> Iterator[None]:
+    """An error of CuPy's or the driver's that comes out of rendering becomes a DeviceError that says what to do.
+
+    After it no GPU is used in this process (`require_sound`): a kernel that trapped takes the context of all with it.
+    """
+    try:
+        yield
+    except DeviceError:
+        raise
+    except Exception as error:
+        if not type(error).__module__.startswith("cupy"):
+            raise
+        if isinstance(error, MemoryError):  # names its bytes, and harms nobody else
+            raise DeviceError(f"The GPU's memory does not suffice ({error}). Lower the resolution.") from error
+        _lost.append(f"{type(error).__name__}: {error}")
+        raise DeviceError(
+            f"The GPU failed while it rendered ({_lost[-1]}). Until Blender is started again, renders go to the CPU."
+        ) from error
+
+
+def require_sound() -> None:
+    """Raises DeviceError if a GPU has failed in this process."""
+    if _lost:
+        raise DeviceError(f"The GPU has failed in this process ({_lost[-1]}). Start Blender again to use it.")
 
 
 @functools.cache

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy
+from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy, require_sound
 from luch.cuda.render import DeviceRenderer, HostFilm, HostScene, parted
 from luch.cuda.trace import TreesTooDeep
 
@@ -27,6 +27,7 @@ def renderer_for(scene: Any) -> Any:
 
     Raises DeviceError where there is none, ValueError for data that does not fit together.
     """
+    require_sound()
     wanted = scene.settings.gpus
     if wanted < 0:
         raise ValueError(f"Settings: gpus is {wanted}; it can be 0 (all) or how many to use.")
