@@ -9,6 +9,7 @@ from luch.scene import (
     Attribute,
     Camera,
     CameraMotion,
+    Curves,
     Film,
     Image,
     InstanceMotion,
@@ -118,7 +119,29 @@ def _mesh(rng: Rng, index: int, moves: bool, wild: float) -> Mesh:
         mesh.motion_positions = _single(positions + rng.normal(0.0, 0.2, (keys, vertices, 3)))
         if mesh.normals is not None:
             mesh.motion_normals = np.repeat(mesh.normals[None], keys, axis=0)
+    _add_hair(rng.spawn(1)[0], mesh, moves, wild)
     return mesh
+
+
+def _add_hair(rng: Rng, mesh: Mesh, moves: bool, wild: float) -> None:
+    """From numbers of its own, so that seeds of old keep their scenes."""
+    if not chance(rng, 0.4):
+        return
+    counts = rng.integers(0, 6, int(rng.integers(0, 5)))
+    points = rng.normal(0.0, 0.7, (int(counts.sum()), 4))
+    points[:, 3] = np.abs(points[:, 3]) * 10.0 ** rng.uniform(-4, 0)
+    if len(points) > 2 and chance(rng, 0.3):
+        points[1:3] = points[0]
+    first = np.cumsum([0, *counts[:-1]])[: len(counts)].astype(np.uint32)
+    rows = _single(_sprinkle(rng, points, wild))
+    mesh.curves = Curves(rows, first, rng.integers(0, 3, len(counts)).astype(np.uint16))
+    if moves and chance(rng, 0.5):
+        keys = int(rng.integers(2, 4))
+        mesh.curves.motion_points = _single(points + rng.normal(0.0, 0.2, (keys, *points.shape)))
+    for name, domain, count in (("UVMap", "CURVE", len(counts)), ("mass", "CURVE_POINT", len(points))):
+        if chance(rng, 0.4):
+            shape = count, int(rng.integers(1, 5))
+            mesh.attributes[name] = Attribute(_single(_sprinkle(rng, rng.normal(size=shape), wild)), domain)
 
 
 def _object(rng: Rng, index: int, meshes: int, materials: int) -> Object:
@@ -274,4 +297,5 @@ def _settings(rng: Rng) -> Settings:
         accelerator=STRUCTURES[int(rng.integers(len(STRUCTURES)))],
         precision=("WATERTIGHT", "FAST", "DOUBLE")[int(rng.integers(3))],
         estimate_error=chance(rng, 0.7),
+        curve_shape=("RIBBON", "THICK", "THICK_LINEAR")[int(rng.spawn(1)[0].integers(3))],
     )
