@@ -32,6 +32,10 @@ OPTIONS = (
     "--luch-samples N",
     "--luch-verify",
     "--luch-gpus N",
+    "--luch-seed N",
+    "--luch-mergeable",
+    "--luch-first-sample N",
+    "--luch-samples-in-all N",
     "--luch-without-effect NAME",
     "--luch-force-effect NAME|ALL",
 )
@@ -54,6 +58,9 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     parser.add_argument("--luch-quality", choices=(CUSTOM, *STEPS), type=str.upper)
     parser.add_argument("--luch-denoise", action="store_const", const=True)
     parser.add_argument("--luch-verify", action="store_const", const=True)
+    parser.add_argument("--luch-mergeable", action="store_const", const=True)
+    for name in ("seed", "first-sample", "samples-in-all"):
+        parser.add_argument(f"--luch-{name}", type=_count)
     found, rest = parser.parse_known_args(own)
     unknown = [word for word in rest if word.startswith("--luch")]
     if unknown:
@@ -61,9 +68,18 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     told = {name.removeprefix("luch_"): value for name, value in vars(found).items() if value is not None}
     if "error_limit" in told:
         told.setdefault("samples", UNLIMITED_SAMPLES)
-    if told.keys() & {"error_limit", "samples"}:
+    if told.get("mergeable"):
+        told["denoise"] = False  # parts are sums of samples; what they merge to may be denoised
+    if told.keys() & {"error_limit", "samples", "mergeable"}:
         told.setdefault("quality", CUSTOM)  # a dial in the file gives way
     return told
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if not 0 <= value < 1 << 31:
+        raise argparse.ArgumentTypeError(f"{text} is not from 0 to 2147483647")
+    return value
 
 
 def _positive_number(text: str) -> float:

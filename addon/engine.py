@@ -12,7 +12,7 @@ import bpy
 from luch import record
 from luch.scene import Scene
 
-from . import passes
+from . import mergeable, passes
 from .report import Reporter, describe_error
 from .result import ResultWriter
 
@@ -75,6 +75,7 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         stats = reporter.statistics(scene, result.stats)
         last_stats[depsgraph.scene.name] = stats
         live_stats.pop(depsgraph.scene.name, None)
+        mergeable.keep(depsgraph.scene, depsgraph.view_layer.name, scene, result)
         reporter.say_how_it_went(stats)
         writer.stamp(stats, scene)
 
@@ -126,15 +127,17 @@ def capture_scene(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Sc
 
 
 def write_record(scene: bpy.types.Scene, *_: Any) -> None:
-    """Beside every frame that a headless render has written: NAME.json, with all that is known. For farms."""
+    """Beside every frame that a headless render has written: NAME.json, with all that is known; and what merges, where
+    that is asked for. For farms."""
     stats = last_stats.get(scene.name)
     if not bpy.app.background or stats is None or scene.render.engine != LuchRenderEngine.bl_idname:
         return
-    path = Path(bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current))).with_suffix(".json")
+    frame = Path(bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current)))
     try:
-        record.write_json(path, stats)
-    except OSError as error:
-        print(f"Luch: {path}: cannot be written ({error}). The frame is there.", file=sys.stderr)
+        record.write_json(frame.with_suffix(".json"), stats)
+        mergeable.write(scene, frame)
+    except (OSError, ValueError, ImportError, RuntimeError) as error:
+        print(f"Luch: a file beside {frame} cannot be written ({error}). The frame is there.", file=sys.stderr)
 
 
 def register() -> None:
