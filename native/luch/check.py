@@ -159,6 +159,8 @@ def _fault_of(node: Node, program: Program) -> str:
         slot, count = words[_ATTRIBUTE_WORDS[name]], len(program.attributes)
         unread = name == "NORMAL_MAP" and words[0] != 0  # only those in tangent space read one
         return "" if slot >= ATTRIBUTE_UV or slot < count or unread else f"reads attribute {slot} of {count}"
+    if name == "LIGHT_PATH_KIND_DEPTH":  # which byte of a path's depths
+        return "" if words[0] <= 24 else f"shifts by {words[0]} bits"
     if name == "STORE_AOV":
         return "" if words[0] < len(program.aovs) else f"stores AOV {words[0]} of {len(program.aovs)}"
     size = _table_size(name, words, program)
