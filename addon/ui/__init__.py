@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import accuracy, datablocks, effects, motion, operators, panels, report, stock
+from . import accuracy, datablocks, effects, hair, motion, operators, panels, report, stock
 
 
 def register() -> None:
@@ -12,6 +12,7 @@ def register() -> None:
     accuracy.register()
     report.register()
     motion.register()
+    hair.register()
     effects.register()
     datablocks.register()
 
@@ -21,6 +22,7 @@ def unregister() -> None:
     effects.unregister()
     report.unregister()
     accuracy.unregister()
+    hair.unregister()
     motion.unregister()
     panels.unregister()
     stock.unregister()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from addon import engine
-from addon.ui import accuracy, datablocks, effects, panels, plot, stock
+from addon.ui import accuracy, datablocks, effects, hair, panels, plot, stock
 
 
 class Layout:
@@ -75,6 +75,14 @@ def test_nodes_worlds_objects_and_materials_show_what_is_read_of_them(scene: bpy
     assert "sampling_method" in draw(datablocks.LUCH_WORLD_PT_settings, scene, world=world)
     assert "visible_shadow" in draw(datablocks.LUCH_OBJECT_PT_ray_visibility, scene, object=thing)
     assert "pass_index" in draw(datablocks.LUCH_MATERIAL_PT_settings, scene, material=material)
+
+
+def test_hair_shows_its_shape_and_subdivisions_of_ribbons_alone(scene: bpy.types.Scene) -> None:
+    assert draw(hair.LUCH_RENDER_PT_hair, scene) == ["shape", "subdivisions"]
+    scene.cycles_curves.shape = "THICK"
+    assert draw(hair.LUCH_RENDER_PT_hair, scene) == ["shape"]
+    without = SimpleNamespace(scene=SimpleNamespace(), engine="LUCH")
+    assert not hair.LUCH_RENDER_PT_hair.poll(without)
 
 
 @pytest.mark.parametrize("name", sorted(stock.INCLUDED))
