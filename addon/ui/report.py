@@ -137,7 +137,7 @@ class LUCH_RENDER_PT_report(LuchPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         for sentence in sentences[:SHOWN]:
             for number, line in enumerate(textwrap.wrap(sentence, letters)):
-                column.label(text=line, icon="NONE" if number else "DOT")
+                column.label(text=line, icon="BLANK1" if number else "DOT")
         self.layout.operator("wm.url_open", text="Open Report", icon="URL").url = page.as_uri()
 
 

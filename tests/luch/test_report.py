@@ -17,6 +17,7 @@ from luch.cli import main
 from luch.effects import effects_of
 from luch.render import render
 from luch.report import Cancelled, Report, Told, make_report, read, write
+from luch.report.chart import groups
 from luch.report.plan import AS_SET, EXACT, plan
 from luch.report.results import Point, Row
 from luch.report.schedule import Session
@@ -29,7 +30,7 @@ from luch.shader import ProgramBuilder
 from support.effects import closure, program
 from support.everything import everything, quad, stone
 
-SECONDS = 6.0
+SECONDS = 200.0  # more than it takes
 CLAMP = 0.5  # of indirect light: some of it is cut
 
 
@@ -63,10 +64,12 @@ def room(**settings: Any) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def made() -> tuple[Report, dict[str, Any], float]:
-    began = time.perf_counter()
-    report, pictures = make_report(room(clamp_indirect=CLAMP), SECONDS)
-    return report, pictures, time.perf_counter() - began
+def made() -> tuple[Report, dict[str, Any]]:
+    """By work that is fixed, not by time: a busy machine measures the same."""
+    session = Session(room(clamp_indirect=CLAMP), SECONDS, None, size=24, samples=8, rounds=3)
+    report = session.run()
+    report.sentences = sentences(report)
+    return report, session.pictures()
 
 
 # -- bias and noise ---------------------------------------------------------------------------
@@ -118,7 +121,7 @@ def test_the_samples_where_noise_falls_under_the_bias_are_foretold() -> None:
     assert 50.0 < line.samples_for(bias**2) < 200.0
 
 
-def test_a_floor_that_was_measured_in_seconds_is_that_of_long_renders(made: tuple[Report, Any, float]) -> None:
+def test_a_floor_that_was_measured_in_seconds_is_that_of_long_renders(made: tuple[Report, Any]) -> None:
     """A9: floor within 1.5 times, samples until noise is below it within twice, of what thousands of samples say."""
     report = made[0]
     row = report.row(AS_SET)
@@ -174,15 +177,15 @@ def test_what_is_not_tried_is_told_with_its_reason() -> None:
 # -- the whole --------------------------------------------------------------------------------
 
 
-def test_a_report_keeps_to_its_time_and_measures_everything(made: tuple[Report, Any, float]) -> None:
-    report, _, took = made
-    assert took <= SECONDS + 0.5
+def test_a_report_measures_everything_that_was_planned(made: tuple[Report, Any]) -> None:
+    report = made[0]
+    assert not report.unmeasured
     assert report.base == AS_SET and report.rows[0].name == EXACT
-    assert all(row.renders >= 2 and row.points for row in report.rows)
+    assert all(row.renders == 3 and row.points for row in report.rows)
     assert report.sentences
 
 
-def test_structures_give_the_same_picture_and_other_times(made: tuple[Report, Any, float]) -> None:
+def test_structures_give_the_same_picture_and_other_times(made: tuple[Report, Any]) -> None:
     rows = [row for row in made[0].rows if row.group == "Structure"]
     base = made[0].base_row
     assert rows and base is not None
@@ -193,14 +196,14 @@ def test_structures_give_the_same_picture_and_other_times(made: tuple[Report, An
     assert brute is not None and brute.cost > 0.0
 
 
-def test_effects_left_out_cost_nothing_and_change_the_picture(made: tuple[Report, Any, float]) -> None:
+def test_effects_left_out_cost_nothing_and_change_the_picture(made: tuple[Report, Any]) -> None:
     effects = {row.effect: row for row in made[0].effects}
     light = effects["indirect light"]
     assert light.cost_share > 0.1 and light.floor.sure and light.brightness < 0.0
     assert effects["area lamps"].brightness < 0.0
 
 
-def test_dots_lie_on_the_lines_of_bias_and_noise(made: tuple[Report, Any, float]) -> None:
+def test_dots_lie_on_the_lines_of_bias_and_noise(made: tuple[Report, Any]) -> None:
     """Two ways to the same number: errors against the reference, and bias and noise by seeds."""
     for row in made[0].rows:
         point = row.at_taken()
@@ -209,10 +212,10 @@ def test_dots_lie_on_the_lines_of_bias_and_noise(made: tuple[Report, Any, float]
             assert 0.8 * low < point.error < 1.25 * high, row.name
 
 
-def test_the_page_is_one_file_and_the_numbers_come_back(made: tuple[Report, Any, float], tmp_path: Path) -> None:
-    report, pictures, _ = made
+def test_the_page_is_one_file_and_the_numbers_come_back(made: tuple[Report, Any], tmp_path: Path) -> None:
+    report, pictures = made
     page = write(report, pictures, tmp_path / "new" / "report").read_text(encoding="utf-8")
-    assert page.count("<svg") >= 4 and "data:image/png;base64," in page
+    assert page.count("<svg") == len(groups(report)) >= 1 and "data:image/png;base64," in page
     assert not re.search(r"""(src|href)=(?!"data:)|url\(|@import|<script""", page)
     for sentence in report.sentences:
         assert sentence.split('"')[0] in page
@@ -223,7 +226,7 @@ def test_the_page_is_one_file_and_the_numbers_come_back(made: tuple[Report, Any,
     with (folder / "curves.csv").open(encoding="utf-8") as file:
         lines = list(csv.DictReader(file))
     assert len(lines) == sum(len(row.points) for row in report.rows)
-    assert (folder / "error_time.png").stat().st_size > 10_000
+    assert (folder / "error_time.png").stat().st_size > 2_000
     assert {"effects.csv", "reference.png", "as_set.png"} <= {path.name for path in folder.iterdir()}
 
 
@@ -247,9 +250,11 @@ def test_a_report_that_is_cancelled_late_keeps_what_it_found() -> None:
     assert report.cancelled and report.row(EXACT) is not None
 
 
-def test_what_does_not_fit_into_the_time_is_named() -> None:
-    report, _ = make_report(everything(), 0.7)
-    assert report.unmeasured and report.seconds < 1.2
+def test_a_report_keeps_to_its_time_and_names_what_did_not_fit() -> None:
+    began = time.perf_counter()
+    report, _ = make_report(everything(), 1.5)
+    assert time.perf_counter() - began < 2.0
+    assert "denoised" in report.unmeasured
     assert any("There was no time" in sentence for sentence in report.sentences)
 
 
@@ -283,8 +288,8 @@ def test_sentences_say_what_is_best_what_stays_and_what_effects_cost() -> None:
 def test_the_command_line_writes_a_report_and_prints_its_sentences(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_scene(room(), tmp_path / "room.luch")
-    arguments = ["report", str(tmp_path / "room.luch"), "-o", str(tmp_path / "out"), "--seconds", "2", "--size", "8"]
+    write_scene(everything(), tmp_path / "room.luch")
+    arguments = ["report", str(tmp_path / "room.luch"), "-o", str(tmp_path / "out"), "--seconds", "2.5", "--size", "8"]
     assert main([*arguments, "--progress"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1] == str(tmp_path / "out" / "report.html")

@@ -14,11 +14,11 @@ from luch.report.sentences import duration
 
 STYLE = """
 :root{color-scheme:light dark;--bar:#0088cc44;--line:#8885}
-body{font:15px/1.5 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em}
+body{font:15px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 1em}
 h1{font-size:1.5em}h2{font-size:1.15em;margin-top:2em}
 table{border-collapse:collapse;width:100%;font-size:13px}
 th,td{text-align:left;padding:.25em .6em .25em 0;border-bottom:1px solid var(--line);vertical-align:top}
-td.n{text-align:right;white-space:nowrap}th.n{text-align:right}
+td:first-child{min-width:15em}td.n{text-align:right;white-space:nowrap}th.n{text-align:right}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(320px,1fr));gap:1.5em}
 .pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(180px,1fr));gap:1em}
 figure{margin:0}figure img{width:100%;image-rendering:pixelated}figcaption,.small{font-size:12px;opacity:.8}

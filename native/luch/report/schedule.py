@@ -41,6 +41,7 @@ LEAST_SIZE, MOST_SIZE = 32, 320  # pixels along the longer side
 LEAST_SAMPLES, MOST_SAMPLES = 8, 256
 LEAST_ROUNDS, GOOD_ROUNDS, MOST_ROUNDS = 2, 4, 16
 REFERENCE_SHARE = 0.25  # of the time
+MOST_OVER = 64  # of the samples of the others: a half of the reference needs no more
 WRITING_SECONDS = 1.0  # kept for statistics and files
 WRITING_SHARE = 0.04
 LEAST_SECONDS_TO_FILTER = 3.0  # of a report: loading the filter and timing it take half a second
@@ -81,15 +82,16 @@ class Cancelled(Exception):
 
 
 class Session:
-    """One report while it is made. only: which variants. rounds: at most. patience: it is planned for its seconds, and
+    """One report while it is made. only: which variants. size, samples: of the small
+    pictures, 0: as the time allows. rounds: at most. patience: it is planned for its seconds, and
     may take so many times as long where the machine turns out slower."""
 
     def __init__(self, scene: Scene, seconds: float, watch: Watch | None, only: Callable[[Variant], bool] | None = None,
-                 *, size: int = 0, rounds: int = MOST_ROUNDS, patience: float = 1.0) -> None:  # fmt: skip
+                 *, size: int = 0, samples: int = 0, rounds: int = MOST_ROUNDS, patience: float = 1.0) -> None:  # fmt: skip
         if not seconds > 0.0:
             raise ValueError(f"A report needs time: {seconds:g} seconds were given.")
         self.scene, self.seconds, self._watch, self._only, self._size = scene, seconds, watch, only, size
-        self._rounds, self._patience = rounds, patience
+        self._rounds, self._patience, self._asked_samples = rounds, patience, samples
         self.start = time.perf_counter()
         self.cancelled = False
         self._doing = "pilot"
@@ -183,7 +185,7 @@ class Session:
         pixels = film_pixels(self._small.film)
         while samples < MOST_SAMPLES and 2 * samples * pixels < paths:
             samples *= 2
-        self._samples = samples
+        self._samples = self._asked_samples or samples
 
     def _drop_what_does_not_fit(self, pace: float, build: float) -> None:
         each = build + AVERAGE_COST * pace * film_pixels(self._small.film) * self._samples
@@ -203,7 +205,7 @@ class Session:
         first = self._shoot("reference", exact, REFERENCE_SEEDS[0], self._samples)
         each = max(first.trace_seconds / self._samples, 1e-6)
         wanted = (until - self.spent - 2.0 * first.build_seconds) / (2.0 * each)
-        done = max(2 * self._samples, 1 << int(math.log2(max(2.0, wanted))))
+        done = max(2 * self._samples, 1 << int(math.log2(max(2.0, min(wanted, MOST_OVER * self._samples)))))
         shots = [self._shoot("reference", exact, seed, done, denoised=self._filters) for seed in REFERENCE_SEEDS]
         halves = [shot.last.astype(np.float64) for shot in shots]
         self._truth = 0.5 * (halves[0] + halves[1])

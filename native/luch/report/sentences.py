@@ -35,10 +35,9 @@ def _picture(report: Report) -> str:
 
 def duration(seconds: float) -> str:
     """ "41 s", "5 min", "2.5 h"."""
-    for unit, length in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2.0 * length:
-            return f"{seconds / length:.2g} {unit}"
-    return f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.2g} s"
+    unit, length = next(((u, n) for u, n in (("h", 3600.0), ("min", 60.0)) if seconds >= 2.0 * n), ("s", 1.0))
+    count = seconds / length
+    return f"{count:,.0f} {unit}" if count >= 10.0 else f"{count:.2g} {unit}"
 
 
 def _sampled(report: Report, row: Row, seconds: float) -> float:
@@ -154,7 +153,7 @@ def _capital(text: str) -> str:
 
 
 def _unchanged(row: Row) -> str:
-    return f"changes nothing that could be measured (below {percent(row.floor.high)} %)"
+    return f"does not change measurably (below {percent(row.floor.high)} %)"
 
 
 def _listed(names: list[str]) -> str:
