@@ -31,6 +31,7 @@ OPTIONS = (
     "--luch-denoise",
     "--luch-samples N",
     "--luch-verify",
+    "--luch-adaptive",
     "--luch-gpus N",
     "--luch-seed N",
     "--luch-mergeable",
@@ -61,6 +62,7 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     parser.add_argument("--luch-mergeable", action="store_const", const=True)
     for name in ("seed", "first-sample", "samples-in-all"):
         parser.add_argument(f"--luch-{name}", type=_count)
+    parser.add_argument("--luch-adaptive", action="store_const", const=True)
     found, rest = parser.parse_known_args(own)
     unknown = [word for word in rest if word.startswith("--luch")]
     if unknown:

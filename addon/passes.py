@@ -44,6 +44,7 @@ TABLE = (
     RenderPass("Sample Count", "X", "VALUE", "luch.use_pass_sample_count"),
     RenderPass("Render Time", "X", "VALUE", "luch.use_pass_render_time"),
     RenderPass("Error", "RGB", "COLOR", "luch.use_pass_error"),
+    RenderPass("Reliability", "X", "VALUE", "luch.use_pass_reliability"),
 )
 
 # Passes of Cycles that guide its own sampling of volumes: nothing that Luch has.

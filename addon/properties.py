@@ -129,6 +129,12 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         description="Combined goes through Open Image Denoise, guided by albedo and normal: less noise, biased; the "
         "error that is told is that of the picture before",
     )
+    use_adaptive_sampling: BoolProperty(
+        name="Adaptive Sampling",
+        default=False,
+        description="On the way to the Error Limit, more samples where the error is. What a pixel found never decides about "
+        "its own samples, so no light is lost",
+    )
     verify: BoolProperty(
         name="Verify the Error",
         default=False,
@@ -223,6 +229,12 @@ class LuchViewLayerSettings(bpy.types.PropertyGroup):
     )
     use_pass_error: BoolProperty(
         name="Error", default=False, description="Standard error of Combined, pixel by pixel, in the same unit"
+    )
+    use_pass_reliability: BoolProperty(
+        name="Reliability",
+        default=False,
+        description="How far the Error pass may be believed: below one half, light was found so near by that the pixel may "
+        "have missed it",
     )
     use_pass_sample_count: BoolProperty(
         name="Sample Count", default=False, description="How many paths went through each pixel"

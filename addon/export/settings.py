@@ -53,6 +53,7 @@ def export_settings(context: ExportContext) -> Settings:
         denoise=effective(scene, "use_denoising"),
         quality=scene.luch.quality,
         quality_report=report_of(scene) if scene.luch.quality_by_report else "",
+        adaptive=scene.luch.use_adaptive_sampling,
         error_limit=scene.luch.error_limit_percent / 100.0,
         without_effects=names_of(scene.luch.without_effects),
         force_effects=["ALL"] if scene.luch.force_effects else [],

@@ -51,7 +51,7 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
             scene,
             *(("samples",) if custom else ()),
             "time_limit",
-            *(("error_limit_percent", "use_denoising") if custom else ()),
+            *(("error_limit_percent", "use_adaptive_sampling", "use_denoising") if custom else ()),
             "verify",
             "seed",
             "use_animated_seed",
@@ -165,6 +165,7 @@ class LUCH_VIEWLAYER_PT_passes_data(LuchPanel, bpy.types.Panel):
         column.prop(layer.luch, "use_pass_sample_count")
         column.prop(layer.luch, "use_pass_render_time")
         column.prop(layer.luch, "use_pass_error")
+        column.prop(layer.luch, "use_pass_reliability")
         layout.prop(layer, "pass_alpha_threshold")
 
 

@@ -31,6 +31,11 @@ class PyRenderer {
         return renderer_->render(first, count);
     }
 
+    bool render_regions(const std::vector<u32>& begins, const std::vector<u32>& ends) {
+        py::gil_scoped_release release;
+        return renderer_->render_regions(begins, ends);
+    }
+
     bool prepare() {
         py::gil_scoped_release release;
         return renderer_->prepare();
@@ -217,6 +222,8 @@ void bind_render(py::module_& m) {
         .def("prepare", &PyRenderer::prepare, "Builds structures and lights, once, first of all. False when cancelled.")
         .def("render", &PyRenderer::render, py::arg("first"), py::arg("count"),
              "Traces samples [first, first + count) of every pixel. False when cancelled.")
+        .def("render_regions", &PyRenderer::render_regions, py::arg("begins"), py::arg("ends"),
+             "Traces samples [begins[r], ends[r]) of region r (luch.adaptive). False when cancelled.")
         .def("cancel", &PyRenderer::cancel, "Callable from any thread.")
         .def("step_progress", &PyRenderer::step_progress, "Share of the running step that is done, 0..1.")
         .def("passes", &PyRenderer::passes, "Blender's pass name -> float32 (H, W, C), bottom row first.")

@@ -105,18 +105,6 @@ def _measured(deviation: F32) -> tuple[F64, F64, F64]:
     )
 
 
-def standard_error(deviation: F32, factor: float = 1.0) -> F32:
-    """Standard error of every pixel and channel: (H, W, 3) -> (H, W, 3); NaN where no neighbour is known.
-
-    factor: what luch.curve takes out of deviations of one sequence's parts.
-
-    One difference says little of its own pixel, and says 0 where a rare path was missed: neighbours share a variance.
-    """
-    d, _, count = _measured(deviation)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(factor * np.sqrt(np.maximum(box_sum(d * d), 0.0) / count), dtype=np.float32)
-
-
 def _truth_guesses(mean: F32, d: F64, known: F64) -> list[F32]:
     """What each pixel is divided by: the truth is not known, and a pixel's own noise must not hide its error.
 

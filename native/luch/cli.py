@@ -82,6 +82,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     render.add_argument("--gpus", type=_positive(int), help="how many GPUs share the samples (default: all)")
     render.add_argument("--threads", type=int, help="0: one per processor")
+    render.add_argument("--adaptive", action="store_true", help="until that error: more samples where the error is")
     render.add_argument("--mergeable", action="store_true", help="keep the film's sums in the .exr, for `merge`")
     render.add_argument(
         "--verify",
@@ -180,8 +181,7 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _merge(options: argparse.Namespace) -> int:
-    from luch import image, merge, record
-    from luch.render import ERROR_PASS
+    from luch import image, merge, pixel_error, record
 
     if options.output.suffix.lower() != ".exr":
         raise ValueError(f"{options.output}: the name must end in .exr")
@@ -192,7 +192,7 @@ def _merge(options: argparse.Namespace) -> int:
     stats: dict[str, Any] = {"samples": whole.samples, "stopped_by": "merged", "merged": len(parts)}
     if found is not None:
         stats |= found.statistics()
-        passes[ERROR_PASS] = whole.error_pass()
+        passes |= whole.error_passes([pixel_error.ERROR_PASS, pixel_error.RELIABILITY_PASS])
     stats["render_seconds"] = sum(float(header.get("luch.render_seconds", 0.0)) for header in headers)
     kept = {key: value for key, value in headers[0].items() if key.startswith("cryptomatte/") or key == "luch.scene"}
     metadata = {**kept, **record.header_fields(stats)}
@@ -234,6 +234,7 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
     if options.seed is not None:
         settings.seed = options.seed
     settings.mergeable, settings.verify = options.mergeable, options.verify
+    settings.adaptive = settings.adaptive or options.adaptive
     if options.device is not None:
         settings.device = options.device
     if options.threads is not None:

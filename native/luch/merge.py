@@ -60,12 +60,12 @@ class Sums:
         found = accuracy.estimate(mean, deviation)
         return found and curve.corrected(found, 0.0 if self.independent else share, *self.rate)
 
-    def error_pass(self) -> F32:
-        """The standard error of Combined, (H, W, 3)."""
-        from luch.render import error_pass
+    def error_passes(self, names: Sequence[str]) -> dict[str, F32]:
+        """Those of luch.pixel_error that are among the names."""
+        from luch.pixel_error import passes_of
 
         _, deviation, share = self.native().deviations()
-        return error_pass(deviation, 0.0 if self.independent else share, self.rate[0])
+        return passes_of(names, deviation, 0.0 if self.independent else share, self.rate[0])
 
     def layers(self) -> dict[str, F32]:
         """As images of a file, beside the passes."""

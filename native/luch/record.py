@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from luch import ledger
+from luch import adaptive, ledger
 from luch.accuracy import percent
 from luch.curve import describe
 
@@ -37,6 +37,8 @@ def line(stats: Mapping[str, Any]) -> str:
 def notes(stats: Mapping[str, Any]) -> list[str]:
     """What else a reader of the error should know, one sentence each."""
     told = [stats["quality"]["reason"]] if "quality" in stats else []
+    if where := adaptive.line(stats):
+        told.append(where[:1].upper() + where[1:])
     if stats.get("denoised"):
         told.append("Denoised: the error is that of the picture before")
     return told + ledger.lines(stats)

@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from luch import accuracy, denoise, ledger, memory
+from luch import accuracy, denoise, ledger, memory, pixel_error
 from luch._native import core
+from luch.adaptive import Adaptive
 from luch.check import check_scene
 from luch.cuda.device import faults_told
-from luch.curve import Curve, Forecast, correction, next_target
+from luch.curve import Curve, Forecast, next_target
 from luch.effects import effects_of
 from luch.effects.removal import without
 from luch.merge import Sums
@@ -38,10 +39,6 @@ LOOK_SECONDS = 0.7e-6
 QUICK_LOOK_SECONDS = 0.02  # taken however short the render, where an error is asked for
 # What reading passes takes at the end of a render that may only take so long; seconds a pixel and channel.
 PASS_SECONDS = 4e-9
-# The standard error of Combined, (H, W, 3), in its unit.
-ERROR_PASS = "Error"
-# Where fewer than two samples tell nothing: files and compositors bear no infinity well.
-UNKNOWN_ERROR = np.float32(1e10)
 
 
 @dataclass
@@ -98,6 +95,19 @@ def film_pixels(film: Film) -> int:
     return (x1 - x0) * (y1 - y0)
 
 
+def _adaptive_for(film: Film, settings: Settings) -> Adaptive | None:
+    """Only on the way to an error; merged pictures must have the same samples everywhere."""
+    if not (settings.adaptive and settings.error_limit > 0.0) or settings.mergeable:
+        return None
+    return Adaptive(film, settings.samples)
+
+
+def _not_adaptive(settings: Settings) -> list[str]:
+    if not (settings.adaptive and settings.error_limit > 0.0 and settings.mergeable):
+        return []
+    return ["Adaptive Sampling is left out: pictures that are merged or verified have the same samples everywhere."]
+
+
 def _renderer_for(scene: Scene) -> tuple[Any, list[str]]:
     """The device's renderer; where CUDA is asked for and cannot be had, the CPU's and one sentence that says why."""
     if scene.settings.device == "CPU":
@@ -122,6 +132,7 @@ class _Loop:
         self.curve = Curve()
         self.stopping = Stopping(max(1, settings.samples), settings.error_limit)
         self.done = 0
+        self.adaptive = _adaptive_for(scene.film, settings)
         self.prepared = start
         self.cancelled = self.timed_out = False
         pixels = film_pixels(scene.film)
@@ -167,8 +178,7 @@ class _Loop:
             return not (self.cancelled or self.timed_out)
 
         left = self.seconds_left if first > 0 else lambda: float("inf")
-        start = self.settings.first_sample
-        watched(partial(self.renderer.render, start + first, count), self.renderer, goes_on, left)
+        watched(self._work(count), self.renderer, goes_on, left)
         if self.cancelled or self.timed_out:
             return
         self.done += count
@@ -176,6 +186,16 @@ class _Loop:
         if not self.timed_out:
             self._look(last=False)
         self.cancelled = not self._tell(self.done, 0, True)
+
+    def _work(self, count: int) -> Callable[[], object]:
+        """So many samples more, of every pixel or on average."""
+        start, adaptive = self.settings.first_sample, self.adaptive
+        if adaptive is None:
+            return partial(self.renderer.render, start + self.done, count)
+        begins, adaptive.counts = adaptive.counts, adaptive.ends(self.done + count)
+        if not adaptive.used:
+            return partial(self.renderer.render, start + self.done, count)
+        return partial(self.renderer.render_regions, start + begins, start + adaptive.counts)
 
     def _look(self, last: bool) -> None:
         """A point of the curve: where the rule of stopping wants one and it costs next to nothing, and at the end."""
@@ -188,7 +208,9 @@ class _Loop:
         allowed = LOOK_SHARE * self.seconds
         if self.settings.error_limit > 0.0:
             allowed = max(allowed, QUICK_LOOK_SECONDS)
-        due = self.done == self.stopping.next_look(self.done - 1) and self._look_busy <= allowed
+        # Where samples go must not depend on how fast the machine is.
+        due = self.done == self.stopping.next_look(self.done - 1)
+        due = due and (self._look_busy <= allowed or self.adaptive is not None)
         asked = self.done == self.stopping.settled
         if not self.settings.estimate_error or not (last or due or asked):
             return
@@ -199,7 +221,8 @@ class _Loop:
         self._look_busy = time.thread_time() - busy
         if found is not None:
             self.curve.add(self.done, self.seconds, found, share)
-            self.stopping.look(self.curve)
+            if not self.stopping.look(self.curve) and self.adaptive is not None:
+                self.adaptive.decide(mean, deviation, self.done)
 
     def _fraction(self, samples: float) -> float:
         """Of the whole work: whichever end is nearer."""
@@ -243,12 +266,6 @@ class _Loop:
         return "error" if self.stopping.reached else "time" if self.timed_out else "samples"
 
 
-def error_pass(deviation: F32, share: float, rate: float) -> F32:
-    """From a film's deviations and the rate that luch.curve found; share 0: of independent parts."""
-    error = accuracy.standard_error(deviation, correction(share, rate))
-    return np.where(np.isfinite(error), error, UNKNOWN_ERROR)
-
-
 def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) -> Result:
     """Renders ``scene`` as its settings say, until its samples, its time limit or the error asked for are reached.
 
@@ -271,10 +288,10 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     check_scene(scene)
     effects = effects_of(scene).as_dict()
     scene = without(scene, scene.settings.without_effects)
-    own = [name for name in scene.film.passes if name != ERROR_PASS or name in (aov for aov, _ in scene.film.aovs)]
-    wants_error = len(own) < len(scene.film.passes)
+    wanted = pixel_error.wanted(scene.film)
+    own = [name for name in scene.film.passes if name not in wanted]
     settings = scene.settings
-    if wants_error or settings.error_limit > 0.0 or settings.mergeable:
+    if wanted or settings.error_limit > 0.0 or settings.mergeable:
         settings = replace(settings, estimate_error=True)
     traced = replace(scene, film=replace(scene.film, passes=own), settings=settings)
     memory.require(traced)
@@ -300,14 +317,16 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         peak_memory_bytes=peak_memory_bytes(),
         cancelled=loop.cancelled,
         stopped_by=loop.stopped_by(),
-        warnings=[*scene.warnings, *warnings, *getattr(renderer, "warnings", [])],
+        warnings=[*scene.warnings, *_not_adaptive(settings), *warnings, *getattr(renderer, "warnings", [])],
         effects=effects,
     )
+    if loop.adaptive is not None:
+        stats.update(loop.adaptive.statistics(renderer.film_arrays()[1]))
     stats.update(ledger.shares(stats, passes["Combined"], scene.film.exposure))
     stats.update(loop.curve.statistics())
-    if wants_error:
+    if wanted:
         _, deviation, share = renderer.deviations()
-        passes[ERROR_PASS] = error_pass(deviation, share, loop.curve.rate()[0])
+        passes |= pixel_error.passes_of(wanted, deviation, share, loop.curve.rate()[0])
     stats["total_seconds"] = time.perf_counter() - start
     sums = None
     if settings.mergeable:

@@ -277,6 +277,7 @@ class Settings:
     samples: int = 128
     time_limit: float = 0.0  # seconds with building and writing of the film, 0: none
     error_limit: float = 0.0  # the render ends when its error is that small (luch.accuracy), 0: none
+    adaptive: bool = False  # until that error: more samples where the error is (luch.adaptive)
     seed: int = 0
     # Several renders of one seed, each with samples of its own, merge into one (luch.merge).
     first_sample: int = 0

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from luch import ledger, merge
+from luch import ledger, merge, pixel_error
 from luch.accuracy import NORMAL_95
-from luch.render import ERROR_PASS, Progress, Result, render
+from luch.render import Progress, Result, render
 from luch.scene import Scene
 
 # An error told within this factor is right, however narrow the intervals: relMSE within 0.8..1.25.
@@ -48,8 +48,7 @@ def _merged(scene: Scene, halves: list[Result]) -> Result:
     sums = merge.merge(parts)
     film = sums.native()
     passes = dict(film.resolve())
-    if ERROR_PASS in scene.film.passes:
-        passes[ERROR_PASS] = sums.error_pass()
+    passes |= sums.error_passes(pixel_error.wanted(scene.film))
     stats = dict(halves[0].stats)
     for key in (
         "paths",

@@ -70,7 +70,7 @@ def test_every_pass_arrives_under_blenders_name(room: bpy.types.Scene) -> None:
     switches = [name for name in dir(layer) if name.startswith("use_pass_") and name != "use_pass_grease_pencil"]
     for name in switches:
         setattr(layer, name, True)
-    for name in ("denoising", "sample_count", "render_time", "error"):
+    for name in ("denoising", "sample_count", "render_time", "error", "reliability"):
         setattr(layer.luch, f"use_pass_{name}", True)
     for name, kind in (("Mask", "VALUE"), ("Tint", "COLOR")):
         aov = layer.aovs.add()
@@ -84,6 +84,7 @@ def test_every_pass_arrives_under_blenders_name(room: bpy.types.Scene) -> None:
         "Sample Count": 1,
         "Render Time": 1,
         "Error": 3,
+        "Reliability": 1,
         "CryptoObject00": 4,
         "Mask": 1,
         "Tint": 4,

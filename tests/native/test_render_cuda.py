@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from luch._native import core
 from luch.cuda import device, several
 from luch.cuda import render as device_render
 from luch.render import Progress, render
@@ -117,6 +118,34 @@ def test_too_little_memory_is_told_with_its_remedy(place: str, monkeypatch: pyte
     monkeypatch.setattr(device_render, "MEMORY_SHARE", 1e-9)
     with pytest.raises(device.DeviceError, match=r"GiB free; the film of this picture and .* paths need more"):
         render(scene)
+
+
+def in_regions(scene: Scene, renderer: Any) -> tuple[Any, Any]:
+    """Regions with samples of their own, marks within: Combined, and what tells its error."""
+    assert renderer.prepare()
+    assert renderer.render(0, 3)
+    begins = np.full(4, 3, np.uint32)
+    ends = np.array([3, 9, 6, 4], np.uint32)
+    assert renderer.render_regions(begins, ends) and renderer.render_regions(ends, ends + np.uint32(2))
+    return renderer.passes(), renderer.deviations()
+
+
+def test_regions_take_the_samples_that_the_cpus_take(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plainly = plain()
+    settings = replace(plainly.settings, samples=16, estimate_error=True)
+    scene = replace(plainly, film=replace(plainly.film, passes=["Combined", "Sample Count"]), settings=settings)
+    on_device = replace(scene, settings=replace(settings, device="CUDA"))
+    monkeypatch.setattr(device_render, "MOST_PATHS", 96)  # of 280 pixels
+    monkeypatch.setattr(device_render, "FEWEST_PATHS", 96)
+    monkeypatch.setattr(several, "usable_devices", lambda: [0, 0])
+    cpu, (_, deviation, share) = in_regions(scene, core.render.Renderer(scene))
+    assert set(np.unique(cpu["Sample Count"])) == {5.0, 6.0, 8.0, 11.0}
+    for renderer in (device_render.DeviceRenderer(on_device), several.SeveralDevices(on_device, [0, 0])):
+        ours, (_, own_deviation, own_share) = in_regions(on_device, renderer)
+        assert np.array_equal(cpu["Sample Count"], ours["Sample Count"])
+        check_equal("Combined", cpu["Combined"], ours["Combined"], place)
+        check_equal("deviation", deviation, own_deviation, place)
+        assert share == pytest.approx(own_share)
 
 
 @pytest.fixture

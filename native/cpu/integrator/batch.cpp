@@ -105,6 +105,7 @@ void Batch::generate(const PixelBlock& block) {
     ray_count_ = 0;
     for (int y = 0; y < block.height; y++) {
         for (int x = 0; x < block.width; x++) {
+            if (!block.holds(x, y)) continue;
             u32 px = u32(block.x0 + x), py = u32(block.y0 + y);
             u32 row = film_pixel(writer_.film, px, py);
             if (is_mark(block.first_sample)) film_mark(writer_, row, block.first_sample);

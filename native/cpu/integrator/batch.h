@@ -37,6 +37,10 @@ struct BatchCounts {
 struct PixelBlock {
     int x0, y0, width, height;  // full-frame pixels
     u32 first_sample, sample_count;
+    int half;  // of a chessboard, counted from the corner: 0 its white fields, 1 its black ones; WHOLE: both
+    static constexpr int WHOLE = -1;
+
+    bool holds(int x, int y) const { return half == WHOLE || ((x + y) & 1) == half; }
 };
 
 class Batch {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <stdexcept>
 
 #include "cpu/shade/interpreter.h"
 #include "cpu/sky/world_sun.h"
@@ -10,8 +11,6 @@
 namespace luch::cpu {
 namespace {
 
-// A tile of 16 x 16 pixels with 8 samples each fills a batch; neighbouring rays meet the same nodes.
-constexpr int TILE_SIZE = 16;
 constexpr u32 SAMPLES_PER_BATCH = BATCH_PATHS / (TILE_SIZE * TILE_SIZE);
 // Rays of a path, shadow rays among them. Interiors cast 8 to 12; a low guess only leaves out a trial.
 constexpr double EXPECTED_RAYS = 4.0;
@@ -310,23 +309,34 @@ void Renderer::build_lights() {
     if (scene_.has_world && !lights.world.present) scene_.media.last_turn_matters = 1u;
 }
 
-bool Renderer::render(u32 first, u32 count) {
+size_t Renderer::tile_count() const {
+    const size_t size = TILE_SIZE;
+    return ((input_.film.width + size - 1) / size) * ((input_.film.height + size - 1) / size);
+}
+
+// halves: 1, or 2 for each tile's two; samples_of(i): of the i-th piece of work.
+template <class SamplesOf>
+bool Renderer::trace_tiles(int halves, const SamplesOf& samples_of) {
     const FilmSpec& film = input_.film;
-    int width = int(film.width), height = int(film.height);
-    int columns = (width + TILE_SIZE - 1) / TILE_SIZE, rows = (height + TILE_SIZE - 1) / TILE_SIZE;
-    tiles_total_ = u64(columns) * u64(rows);
+    const int width = int(film.width), height = int(film.height);
+    const size_t columns = size_t((width + TILE_SIZE - 1) / TILE_SIZE);
+    const u32 at_once = u32(halves) * SAMPLES_PER_BATCH;
+    tiles_total_ = tile_count() * u64(halves);
     tiles_done_.store(0);
     double start = seconds_now();
     auto trace = [&](size_t begin, size_t end, unsigned worker) {
-        for (size_t t = begin; t < end; t++) {
+        for (size_t i = begin; i < end; i++) {
             PixelBlock block;
-            int x = int(t % size_t(columns)) * TILE_SIZE, y = int(t / size_t(columns)) * TILE_SIZE;
+            const size_t tile = i / size_t(halves);
+            block.half = halves == 1 ? PixelBlock::WHOLE : int(i % 2);
+            int x = int(tile % columns) * TILE_SIZE, y = int(tile / columns) * TILE_SIZE;
             block.x0 = int(film.x0) + x, block.y0 = int(film.y0) + y;
             block.width = std::min(TILE_SIZE, width - x), block.height = std::min(TILE_SIZE, height - y);
-            for (u32 done = 0; done < count; done += block.sample_count) {
+            const Samples samples = samples_of(i);
+            for (u32 done = 0; done < samples.count; done += block.sample_count) {
                 if (cancelled_.load(std::memory_order_relaxed)) return;
-                block.first_sample = first + done;
-                block.sample_count = std::min(SAMPLES_PER_BATCH, samples_to_mark(first + done, count - done));
+                block.first_sample = samples.first + done;
+                block.sample_count = std::min(at_once, samples_to_mark(samples.first + done, samples.count - done));
                 batches_[worker]->trace(block);
             }
             tiles_done_.fetch_add(1, std::memory_order_relaxed);
@@ -338,6 +348,16 @@ bool Renderer::render(u32 first, u32 count) {
     }
     stats_.trace_seconds += seconds_now() - start;
     return !cancelled_.load();
+}
+
+bool Renderer::render(u32 first, u32 count) {
+    return trace_tiles(1, [&](size_t) { return Samples{first, count}; });
+}
+
+bool Renderer::render_regions(const std::vector<u32>& begins, const std::vector<u32>& ends) {
+    if (begins.size() != 2 * tile_count() || ends.size() != begins.size())
+        throw std::invalid_argument("Renderer: two regions for each tile are needed.");
+    return trace_tiles(2, [&](size_t i) { return Samples{begins[i], ends[i] > begins[i] ? ends[i] - begins[i] : 0u}; });
 }
 
 double Renderer::step_progress() const { return double(tiles_done_.load()) / double(std::max<u64>(tiles_total_, 1)); }

@@ -66,6 +66,10 @@ struct RenderInput {
     MotionInput motion;
 };
 
+// Tiles of 16 x 16 pixels with 8 samples each fill a batch; neighbouring rays meet the same nodes. luch/adaptive.py
+// counts in the same tiles.
+inline constexpr int TILE_SIZE = 16;
+
 struct RenderStats {
     BatchCounts counts;
     AccelStats accel;
@@ -88,6 +92,11 @@ class Renderer {
     // film then holds what was traced, pixel by pixel with its own sample count.
     bool render(u32 first, u32 count);
 
+    // The same for halves of tiles, each with samples [begins[r], ends[r]) of its own: half r % 2 (PixelBlock) of tile
+    // r / 2, tiles of TILE_SIZE^2 pixels from the bottom left corner on, row by row.
+    bool render_regions(const std::vector<u32>& begins, const std::vector<u32>& ends);
+    size_t tile_count() const;
+
     // From any thread, for good: render() returns within one batch's time, prepare() within one step of building.
     void cancel() {
         cancelled_.store(true, std::memory_order_relaxed);
@@ -105,6 +114,11 @@ class Renderer {
     const SceneTrees& trees() const { return *trees_; }
 
  private:
+    struct Samples {
+        u32 first, count;
+    };
+    template <class SamplesOf>
+    bool trace_tiles(int halves, const SamplesOf& samples_of);
     void build_all();
     void build_accel();
     void build_local_trees();

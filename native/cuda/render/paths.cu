@@ -21,6 +21,7 @@ extern "C" __global__ void begin_paths(const __grid_constant__ luch::RenderTask 
     if (i == 0) task.wave.counters[WAVE_RAYS] = count;
     if (i >= count) return;
     u32 layer = i / range.pixel_count, within = i % range.pixel_count, pixel = range.first_pixel + within;
+    if (range.pixels) pixel = range.pixels[pixel];
     u32 slot = layer * task.wave.layer_pixels + within, sample = range.first_sample + layer;
     u32 px = task.film.x0 + pixel % task.film.width, py = task.film.y0 + pixel / task.film.width;
     FilmWriter writer = film_of_slot(task, slot);

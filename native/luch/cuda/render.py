@@ -10,13 +10,14 @@ from __future__ import annotations
 import struct
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
 
 from luch._native import core
+from luch.adaptive import parts, regions_of
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.scene_kernels import SceneKernels
@@ -41,6 +42,10 @@ RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
 COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed", "walks", "walked")  # WaveCounter
 TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
           "light_points", "subsurface_walks", "subsurface_steps", "flights", "clamped_units", "cut_units")  # WaveTotal  # fmt: skip
+
+
+# Pixels of the film, in order (None: all), and their samples: the first and how many.
+Part = tuple[Any, int, int]
 
 
 class Memory:
@@ -145,14 +150,18 @@ class Memory:
         index = COUNTERS.index(name)
         return int(self.counters[index : index + 1].get()[0])
 
-    def mark(self, sample: int) -> None:
-        """As film_mark of luch/film/film.h, of every pixel and layer; to be called before that sample."""
+    def mark(self, sample: int, pixels: Any = None) -> None:
+        """As film_mark of luch/film/film.h, of every layer and pixel (or of those in a list on the device).
+
+        To be called before that sample.
+        """
         marks = self.field("film.layout.marks", "<I")
         if marks == NONE or sample == 0 or sample & (sample - 1):
             return
         channel = marks + (0 if sample & 0x55555555 else MARK_CHANNELS)
-        self.rows[..., channel : channel + 3] = self.rows[..., :3]  # Combined comes first
-        self.rows[..., channel + 3] = self.counts
+        those = slice(None) if pixels is None else pixels
+        self.rows[:, those, channel : channel + 3] = self.rows[:, those, :3]  # Combined comes first
+        self.rows[:, those, channel + 3] = self.counts[:, those]
 
     @property
     def bytes(self) -> int:
@@ -357,41 +366,59 @@ class DeviceRenderer(HostFilm):
 
     def render(self, first: int, count: int) -> bool:
         """Traces samples [first, first + count) of every pixel. False when cancelled; waves are whole or not at all."""
-        with self._device:
-            return self._render(first, count)
+        return self.render_parts([(None, first, count)])
 
-    def _render(self, first: int, count: int) -> bool:
+    def render_regions(self, begins: Any, ends: Any) -> bool:
+        """Traces samples [begins[r], ends[r]) of region r (luch.adaptive). False when cancelled."""
+        return self.render_parts(list(parts(regions_of(self._scene.film), begins, ends)))
+
+    def render_parts(self, work: Sequence[Part]) -> bool:
+        """As render(), each for pixels of its own."""
+        with self._device:
+            return self._render(work)
+
+    def _render(self, work: Sequence[Part]) -> bool:
         enter_context()
-        memory, began = self._memory, time.perf_counter()
-        ranges = [
-            (pixel, min(memory.layer_pixels, memory.pixels - pixel), sample, samples)
-            for sample, samples in parted(first, count, memory.layers)
-            for pixel in range(0, memory.pixels, memory.layer_pixels)
-        ]
-        self._waves_done, self._waves = 0, len(ranges)
-        for wave in ranges:
+        began, waves = time.perf_counter(), list(self._waves_of(work))
+        self._waves_done, self._waves = 0, len(waves)
+        for pixels, wave in waves:
             if self._cancelled:
                 break
             with self._lock:
                 if wave[0] == 0:
-                    memory.mark(wave[2])
-                self._trace_wave(*wave)
+                    self._memory.mark(wave[2], pixels)
+                self._trace_wave(*wave, pixels)
             self._waves_done += 1
         cupy().cuda.get_current_stream().synchronize()
         self._trace_seconds += time.perf_counter() - began
         return not self._cancelled
 
-    def mark(self, sample: int) -> None:
+    def _waves_of(self, work: Sequence[Part]) -> Iterator[tuple[Any, tuple[int, int, int, int]]]:
+        """(pixels on the device or None, (first of them, how many, first sample, samples))."""
+        memory = self._memory
+        for pixels, first, count in work:
+            listed = None if pixels is None else cupy().asarray(np.asarray(pixels, np.uint32))
+            total = memory.pixels if listed is None else len(listed)
+            for sample, samples in parted(first, count, memory.layers):
+                for pixel in range(0, total, memory.layer_pixels):
+                    yield listed, (pixel, min(memory.layer_pixels, total - pixel), sample, samples)
+
+    def mark(self, sample: int, pixels: Any = None) -> None:
         """Parts this device's samples before that one of all devices from those after it, if it is a power of two."""
         with self._lock, self._device:
             enter_context()
-            self._memory.mark(sample)
+            self._memory.mark(sample, None if pixels is None else cupy().asarray(np.asarray(pixels, np.uint32)))
 
-    def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int) -> None:
+    def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int, listed: Any) -> None:
         memory, rays, began = self._memory, pixels * samples, time.perf_counter()
         self._merged = False
         self._counts["paths"] += rays
-        self._launch(self._paths.kernel("begin_paths"), 0, rays, struct.pack("<4I", pixel, pixels, sample, samples))
+        self._launch(
+            self._paths.kernel("begin_paths"),
+            0,
+            rays,
+            struct.pack("<4IQ", pixel, pixels, sample, samples, 0 if listed is None else listed.data.ptr),
+        )
         if self._media:
             self._launch(self._stages.kernel("enter_media"), 0, rays, self._tracer.root)
         turn = 0
@@ -402,7 +429,8 @@ class DeviceRenderer(HostFilm):
             turn ^= 1
             rays = memory.count("rays")
         if self._timed:
-            self._clocks.charge(memory, pixel, pixels, samples, time.perf_counter() - began)
+            those = slice(pixel, pixel + pixels) if listed is None else listed[pixel : pixel + pixels]
+            self._clocks.charge(memory, those, pixels, samples, time.perf_counter() - began)
 
     def _trace_round(self, turn: int, rays: int) -> int:
         """One event of every path; returns how many shadow rays were cast."""

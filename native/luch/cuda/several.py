@@ -13,6 +13,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from luch.adaptive import parts, regions_of
 from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy, require_sound
 from luch.cuda.render import DeviceRenderer, HostFilm, HostScene, parted
 from luch.cuda.trace import TreesTooDeep
@@ -59,6 +60,7 @@ class SeveralDevices(HostFilm):
     def __init__(self, scene: Any, indices: list[int]) -> None:
         """scene: luch.scene.Scene; indices: CUDA's, of at least one device. Raises ValueError as DeviceRenderer."""
         super().__init__(HostScene(scene))
+        self._film = scene.film
         self._devices: list[DeviceRenderer] = []
         for index in indices:
             with cupy().cuda.Device(index):
@@ -106,26 +108,38 @@ class SeveralDevices(HostFilm):
     def render(self, first: int, count: int) -> bool:
         """Traces samples [first, first + count) of every pixel. False when cancelled."""
         self._merged = False
-        return all([self._render_part(*part) for part in parted(first, count, count)])
+        return all([self._render_part(None, *part) for part in parted(first, count, count)])
 
-    def _render_part(self, first: int, count: int) -> bool:
+    def render_regions(self, begins: Any, ends: Any) -> bool:
+        """Traces samples [begins[r], ends[r]) of region r (luch.adaptive). False when cancelled."""
+        self._merged = False
+        regions = regions_of(self._film)
+        return all(
+            [
+                self._render_part(pixels, *part)
+                for pixels, first, count in parts(regions, begins, ends)
+                for part in parted(first, count, count)
+            ]
+        )
+
+    def _render_part(self, pixels: Any, first: int, count: int) -> bool:
         for device in self._devices:
-            device.mark(first)
-        parts = shares(count, self._rates)
-        seconds = [0.0] * len(parts)
+            device.mark(first, pixels)
+        samples = shares(count, self._rates)
+        seconds = [0.0] * len(samples)
 
         def part(k: int, start: int) -> None:
             began = time.perf_counter()
-            self._devices[k].render(start, parts[k])
+            self._devices[k].render_parts([(pixels, start, samples[k])])
             seconds[k] = time.perf_counter() - began
 
-        starts = [first + sum(parts[:k]) for k in range(len(parts))]
-        working = [k for k in range(len(parts)) if parts[k]]
+        starts = [first + sum(samples[:k]) for k in range(len(samples))]
+        working = [k for k in range(len(samples)) if samples[k]]
         for error in self._each([partial(part, k, starts[k]) for k in working]):
             if error is not None:
                 raise error
-        if len(working) == len(parts) and not self._cancelled:
-            self._rates = [samples / max(took, 1e-6) for samples, took in zip(parts, seconds, strict=True)]
+        if len(working) == len(samples) and not self._cancelled:
+            self._rates = [taken / max(took, 1e-6) for taken, took in zip(samples, seconds, strict=True)]
         return not self._cancelled
 
     @staticmethod

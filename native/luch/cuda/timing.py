@@ -35,10 +35,10 @@ class StageClocks:
         ended.record()
         self._runs.append((stage, began, ended))
 
-    def charge(self, memory: Any, pixel: int, pixels: int, samples: int, seconds: float) -> None:
+    def charge(self, memory: Any, those: Any, pixels: int, samples: int, seconds: float) -> None:
         """Adds a wave's seconds to its pixels in the film. The device must have ended it.
 
-        memory: luch.cuda.render.Memory; the wave: pixels [pixel, pixel + pixels), so many samples of each.
+        memory: luch.cuda.render.Memory; those: which pixels of the film, a slice or a list; so many samples of each.
         """
         cp = cupy()
         spent = dict.fromkeys(CLOCKS, 0.0)
@@ -58,4 +58,4 @@ class StageClocks:
         share *= 1000.0 * seconds / whole
         channel = memory.field("film.layout.time", "<I")
         parts = share.reshape(memory.layers, memory.layer_pixels)[:samples, :pixels]
-        memory.rows[:samples, pixel : pixel + pixels, channel] += parts
+        memory.rows[:samples, those, channel] += parts

@@ -20,6 +20,7 @@ PASSES = {
     "Sample Count": 0,
     "Render Time": 1,
     "Error": 0,  # from what the estimate of the error keeps
+    "Reliability": 0,
 }  # fmt: skip
 _COUNTS_BYTES = 4  # samples of a pixel
 

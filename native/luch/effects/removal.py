@@ -152,7 +152,7 @@ _PASSES = (
     "Depth", "Mist", "Position", "Normal", "UV", "Object Index", "Material Index", "Diffuse Direct",
     "Diffuse Indirect", "Diffuse Color", "Glossy Direct", "Glossy Indirect", "Glossy Color", "Transmission Direct",
     "Transmission Indirect", "Transmission Color", "Volume Direct", "Volume Indirect", "Emission", "Environment", "Ambient Occlusion", "Denoising Albedo",
-    "Denoising Normal", "Sample Count", "Render Time", "Error",
+    "Denoising Normal", "Sample Count", "Render Time", "Error", "Reliability",
 )  # fmt: skip
 
 # Effect, by its name in luch.effects -> how it is left out.

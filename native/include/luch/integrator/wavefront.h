@@ -99,10 +99,11 @@ struct RenderTask {
     Wavefront wave;
 };
 
-// One wave: pixels [first_pixel, first_pixel + pixel_count) of the film, each with samples [first_sample,
+// One wave: pixels [first_pixel, first_pixel + pixel_count) of the film, or of a list, each with samples [first_sample,
 // first_sample + sample_count), one layer each.
 struct WaveRange {
     u32 first_pixel, pixel_count, first_sample, sample_count;
+    const u32* pixels;  // no pixel twice; null: all of the film, in order
 };
 
 LUCH_FN PathState load_path(const Wavefront& wave, u32 slot) {

@@ -1,0 +1,51 @@
+"""What a race between two ways to render must heed, so that its figures mean something."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from luch.accuracy import DARK
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+
+class Truth:
+    """Errors against an engine's own converged picture, whose noise is that of so many samples.
+
+    Another engine's picture would do for no other: a row of pixels further, a map read otherwise, and the difference
+    is no error. What both must have in common is their energy.
+    """
+
+    def __init__(self, picture: F64, samples: int) -> None:
+        self.picture, self.samples = picture, samples
+
+    def error(self, picture: F64, samples: float) -> float:
+        """Of a picture of so many samples, the reference's own noise taken out."""
+        whole = np.mean((picture[..., :3] - self.picture) ** 2 / (np.abs(self.picture) + DARK) ** 2)
+        return float(np.sqrt(whole / (1.0 + samples / self.samples)))
+
+    def brightness(self, picture: F64) -> float:
+        """Over the reference's, less 1."""
+        return float(picture[..., :3].mean() / self.picture.mean() - 1.0)
+
+
+def in_turns(
+    one: Callable[[int], object],
+    other: Callable[[int], object],
+    pairs: int,
+    clock: Callable[[], float] = time.process_time,
+) -> list[float]:
+    """Seconds of one over seconds of the other, pair by pair, now the one first and now the other: what else the
+    machine does weighs on both. Take the median."""
+    ratios = []
+    for pair in range(pairs):
+        spent = {}
+        for work in (one, other) if pair % 2 else (other, one):
+            began = clock()
+            work(pair)
+            spent[work] = clock() - began
+        ratios.append(spent[one] / spent[other])
+    return ratios
