@@ -46,7 +46,7 @@ def export_light(subject: Any, matrix: F64, random: float, visibility: int, cont
 def _is_plain(tree: Any) -> bool:
     """True for the tree that Blender gives every lamp: Emission of white, strength 1. It changes nothing."""
     output = tree.get_output_node("CYCLES") if tree is not None else None
-    if output is None or len(output.inputs["Surface"].links) != 1:
+    if output is None or "Surface" not in output.inputs or len(output.inputs["Surface"].links) != 1:
         return False
     node = output.inputs["Surface"].links[0].from_node
     if node.bl_idname != "ShaderNodeEmission" or node.mute or any(socket.is_linked for socket in node.inputs):

@@ -38,4 +38,4 @@ def clear_surface() -> Program:
 def _is_linked(owner: Any, socket: str) -> bool:
     tree = owner.node_tree
     output = tree.get_output_node("CYCLES") if tree is not None else None
-    return output is not None and output.inputs[socket].is_linked
+    return output is not None and socket in output.inputs and output.inputs[socket].is_linked

@@ -35,8 +35,11 @@ def run_case(kind: str, seed: int, folder: Path) -> str:
     """ "rendered", "refused" or "cancelled"; raises Finding. folder: for files.
 
     kinds: "scene" (a random scene), "damaged" (with some fields set to what no exporter would write), "file" (its file
-    with bytes flipped), "header" (its file whose header or arrays were damaged, and whose checksums are right).
+    with bytes flipped), "header" (its file whose header or arrays were damaged, and whose checksums are right), "blender"
+    (a file made in Blender, exported by a render of Blender's).
     """
+    if kind == "blender":
+        return _blender_case(seed)
     rng = np.random.default_rng([seed, 7])
     scene, told = random_scene(seed), ""
     if kind == "damaged":
@@ -44,6 +47,26 @@ def run_case(kind: str, seed: int, folder: Path) -> str:
     elif kind in ("file", "header"):
         return _file_case(kind, seed, scene, folder, rng)
     return _render_case(scene, told)
+
+
+def _blender_case(seed: int) -> str:
+    import bpy
+
+    import addon
+    from addon.engine import capture_scene
+    from fuzz.blender import random_file
+
+    if not hasattr(bpy.types.Scene, "luch"):
+        addon.register()
+    scene = random_file(seed)
+    try:
+        exported = capture_scene(scene, scene.view_layers[0])
+    except RuntimeError as error:
+        text = str(error)
+        if "Luch: " not in text or text.rstrip().endswith("Error)"):  # of a kind that no sentence was written for
+            raise Finding(f"export: {text}") from error
+        return "refused"
+    return _render_case(exported, "from Blender")
 
 
 def _file_case(kind: str, seed: int, scene: Scene, folder: Path, rng: np.random.Generator) -> str:

@@ -203,7 +203,9 @@ def medium_of(owner: bpy.types.Material | bpy.types.World, title: str, context: 
     """The medium of a material or a world; None if it has none. title: 'Material "Fog"', for warnings."""
     tree = owner.node_tree
     output = tree.get_output_node("CYCLES") if tree is not None else None
-    if output is None or not output.inputs["Volume"].is_linked:
+    # A tree may hold outputs of other kinds of tree: a light's has no volume.
+    socket = output.inputs.get("Volume") if output is not None else None
+    if socket is None or not socket.is_linked:
         return None
     inline: Any = bpy.types.InlineShaderNodes
     flat = inline.from_material(owner) if isinstance(owner, bpy.types.Material) else inline.from_world(owner)
