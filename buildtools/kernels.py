@@ -25,6 +25,9 @@ FUSES_BOXES = re.compile("CWBVH|TRACE_.*|RENDER_STAGES|RENDER_WALKS")
 WALKS_IN_DOUBLE = re.compile("(TRACE_)?(HIERARCHICAL_)?GRID")
 # The driver would compile them for minutes; luch.cuda.compiler has them compiled for the scene instead.
 NO_PTX = ("RENDER_STAGES",)
+# Functions of rare effects, which modules that serve many scenes lack.
+OF_RARE = re.compile("closest_moving|any_moving|test_piece|eval_fibre|move_instance")
+SERVES_MANY = re.compile("TRACE_.*|RENDER_STAGES")
 Unit = Tuple[str, str]  # module, precision
 
 
@@ -120,6 +123,9 @@ def faults(unit: Unit, ptx: str) -> List[str]:
         wrong.append("fma.rn.f32: results would differ from the CPU's")
     if precision != "FAST" and re.search(r"\.ftz\b", ptx):
         wrong.append(".ftz: denormal numbers would be lost")
+    rare = OF_RARE.search(ptx) if SERVES_MANY.fullmatch(module) else None
+    if rare:
+        wrong.append(f"{rare.group()}: code of an effect that most scenes lack")
     return [f"{module}, {precision}: {text}" for text in wrong]
 
 

@@ -4,9 +4,8 @@
 // warps fetch rays until there are none. That of the compressed wide tree has trace_closest_one and trace_any_one too,
 // for scenes that are one group in the world, and trace_closest_simple and trace_any_simple, which the race compares.
 #pragma once
-#ifndef LUCH_PLAN_MOTION
-#define LUCH_PLAN_MOTION 0  // one module serves many scenes; those in which something moves have another
-#endif
+#include "render/trace_plan.cuh"
+
 #ifndef LUCH_TIMED_RAYS
 #define LUCH_TIMED_RAYS 0
 #endif

@@ -1,3 +1,5 @@
+#include "render/trace_plan.cuh"
+
 #include "luch/accel/cwbvh.h"
 #define LUCH_VIEW luch::Cwbvh
 #include "render/trace_one.cuh"
