@@ -23,7 +23,7 @@ def lit(tmp_path: Path) -> bpy.types.Scene:
     bpy.ops.object.camera_add(location=(0, 0, 5))
     scene.camera = bpy.context.object
     scene.render.resolution_x, scene.render.resolution_y = 16, 12
-    scene.luch.report_seconds, scene.luch.report_folder = 3.0, str(tmp_path)
+    scene.luch.report_seconds, scene.luch.report_folder = 2.9, str(tmp_path)
     return scene
 
 

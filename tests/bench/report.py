@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import time
 from dataclasses import replace
@@ -89,7 +90,8 @@ def dial(scene: Scene, report: Report, step: str) -> dict[str, float]:
     for row in report.choices:
         if row.name not in CHOICES | {report.base} or row.denoised or row.floor.high > STEPS[step]:
             continue
-        settings = replace(scene.settings, **{**row.settings, "error_limit": STEPS[step], "samples": UNLIMITED_SAMPLES})
+        noise = math.sqrt(STEPS[step] ** 2 - row.floor_relmse)  # bias and noise together make the error
+        settings = replace(scene.settings, **{**row.settings, "error_limit": noise, "samples": UNLIMITED_SAMPLES})
         began = time.perf_counter()
         render(replace(scene, settings=settings))
         took[row.name] = time.perf_counter() - began
