@@ -204,7 +204,7 @@ def medium_of(owner: bpy.types.Material | bpy.types.World, title: str, context: 
     tree = owner.node_tree
     output = tree.get_output_node("CYCLES") if tree is not None else None
     # A tree may hold outputs of other kinds of tree: a light's has no volume.
-    socket = output.inputs.get("Volume") if output is not None else None
+    socket: Any = output.inputs.get("Volume") if output is not None else None
     if socket is None or not socket.is_linked:
         return None
     inline: Any = bpy.types.InlineShaderNodes
