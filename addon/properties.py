@@ -116,7 +116,7 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         ],
         default="CUSTOM",
         description="How much error the picture may have. The settings that reach it soonest are found by a pilot on "
-        "this scene, which takes a tenth of the time at most; Time Limit still holds",
+        "this scene, which takes a second or a tenth of the time; Time Limit still holds",
     )
     quality_by_report: BoolProperty(
         name="By the Last Report",

@@ -1,7 +1,7 @@
 """One dial for those who want no more: how much error the picture may have; the scene's own curve says how to get there.
 
 Each step asks for an error. Which settings reach it soonest is found on this scene: by a report (luch.report) where one
-is given, else by a pilot, a report of few choices that takes a tenth of the time that the render is going to. A choice
+is given, else by a pilot: a first look, and a report of few choices that takes a tenth of the time that the render is foretold. A choice
 that takes light away counts with the largest bias that its measurement allows, and is taken only where it is surely
 sooner than the scene as it is set. The render itself then ends by its own error, as with an error limit.
 """
