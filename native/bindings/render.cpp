@@ -11,6 +11,7 @@
 #include "bindings/forced.h"
 #include "bindings/scene_reader.h"
 #include "bindings/scene_trees.h"
+#include "luch/integrator/borders.h"
 #include "luch/integrator/subsurface.h"
 
 namespace luch::bindings {
@@ -81,6 +82,7 @@ class PyRenderer {
             if (scene.view.lights->lamps[l].has_program) add(scene.view.lights->lamps[l].program);
         py::dict facts;
         facts["programs"] = programs;
+        facts["most_rounds"] = most_rounds(scene.limits);
         facts["registers"] = registers;
         facts["transparent"] = transparent;
         facts["subsurface"] = scene.has_subsurface;

@@ -17,7 +17,7 @@ from luch.scene import Film, Instances, Object, Program, Scene, Settings
 from luch.shader_code import ATTRIBUTE_UV, Node
 
 MOST_THREADS = 1024
-MOST_BOUNCES = 1 << 16  # beyond what any path lives; limits are counted in 32 bits, one more than asked for
+MOST_BOUNCES = 1 << 24  # beyond what any path lives; limits are counted in 32 bits, one more than asked for
 WIDEST_WORLD_MAP = 1 << 14  # 8,192 is the most that Blender offers; memory grows with the square
 MOST_CRYPTOMATTE = 64
 LARGEST_PIXEL_ASPECT = 1e6
@@ -38,6 +38,13 @@ _TABLE_SIZES = {
 }
 # Operations that name an attribute: which of their static words does.
 _ATTRIBUTE_WORDS = {"ATTRIBUTE_VALUE": 2, "ATTRIBUTE_COLOR": 2, "ATTRIBUTE_OBJECT": 0, "TANGENT_UV": 2, "NORMAL_MAP": 2}
+
+# Closures that choose (SubsurfaceMethod, HairColor): which static word says what, and how many there are.
+_CHOICES = {
+    "CLOSURE_SUBSURFACE": (1, 4),
+    "CLOSURE_PRINCIPLED_SUBSURFACE": (4, 4),
+    "CLOSURE_PRINCIPLED_HAIR": (1, 3),
+}
 
 
 def check_scene(scene: Scene) -> None:
@@ -161,6 +168,9 @@ def _fault_of(node: Node, program: Program) -> str:
         return "" if slot >= ATTRIBUTE_UV or slot < count or unread else f"reads attribute {slot} of {count}"
     if name == "LIGHT_PATH_KIND_DEPTH":  # which byte of a path's depths
         return "" if words[0] <= 24 else f"shifts by {words[0]} bits"
+    if name in _CHOICES:
+        at, count = _CHOICES[name]
+        return "" if words[at] < count else f"is of kind {words[at]}, of {count}"
     if name == "STORE_AOV":
         return "" if words[0] < len(program.aovs) else f"stores AOV {words[0]} of {len(program.aovs)}"
     size = _table_size(name, words, program)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz.cases import run_case
 from luch import memory
 from luch.cuda import DeviceError
 from luch.render import render
@@ -281,3 +282,9 @@ def test_two_processes_at_once_draw_what_one_draws(tmp_path: Path) -> None:
     scene = read_scene(tmp_path / "scene.luch")
     scene.settings.samples = 256
     assert seen[0].strip() == hashlib.sha256(render(scene).passes["Combined"].tobytes()).hexdigest()
+
+
+def test_a_ray_that_meets_one_border_again_and_again_ends(tmp_path: Path) -> None:
+    """Seed 36314: fog whose object is stretched to 1e7 m, where numbers have no digits left, and rays stay where they
+    are. It rendered for ever, deaf to a cancel."""
+    assert run_case("scene", 36314, tmp_path) == "rendered"

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cpu/integrator/scratch.h"
+#include "luch/integrator/borders.h"
 #include "luch/integrator/camera_path.h"
 #include "luch/integrator/found_light.h"
 
@@ -80,7 +81,8 @@ BatchCounts Batch::counts() const {
 void Batch::trace(const PixelBlock& block) {
     if (timed()) clock_.start();
     generate(block);
-    while (ray_count_ > 0) {
+    const u32 rounds = most_rounds(scene_.limits);
+    for (u32 round = 0; ray_count_ > 0 && round < rounds; round++) {
         next_count_ = 0;
         shadow_count_ = 0;
         traverse();

@@ -311,6 +311,7 @@ class DeviceRenderer(HostFilm):
             if facts["subsurface"]
             else None
         )
+        self._most_rounds = int(facts["most_rounds"])
         self._media = facts["media"] and self._stages.plan["VOLUMES"]
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
@@ -421,8 +422,9 @@ class DeviceRenderer(HostFilm):
         )
         if self._media:
             self._launch(self._stages.kernel("enter_media"), 0, rays, self._tracer.root)
-        turn = 0
-        while rays:
+        turn, left = 0, self._most_rounds
+        while rays and left:
+            left -= 1
             shadows = self._trace_round(turn, rays)
             self._counts["rays"] += rays
             self._counts["shadow_rays"] += shadows

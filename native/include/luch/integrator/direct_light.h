@@ -1,5 +1,6 @@
 // Next-event estimation: one light per shaded point, its emission, and the shadow ray.
 #pragma once
+#include "luch/integrator/borders.h"
 #include "luch/integrator/scatter.h"
 
 namespace luch {
@@ -183,6 +184,7 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const 
                                Tracer& tracer, Shader& shader, ShadePoints& points, u64* steps, u64* rays) {
     Color through = make_vec3(1.0f);
     Ray ray = first;
+    u32 borders = 0;
     for (u32 passed = shadow.transparent_depth; passed <= scene.limits.transparent; passed++) {
         Hit hit = tracer.closest(ray);
         ++*rays;
@@ -192,6 +194,7 @@ LUCH_FN Color walk_transparent(const RenderView& scene, const Ray& first, const 
             if (hit.instance != NONE && is_border(scene.view, hit)) {
                 pass_surface(scene.view, *stack, hit, tracer.time, &ray);
                 passed--;  // no surface: it counts as none
+                if (++borders > MOST_BORDERS) return make_vec3(0.0f);
                 if (!(ray.t_max > 0.0f)) return through;
                 continue;
             }
