@@ -42,8 +42,8 @@ LUCH_FN Hit closest_hit(const LocalTreesView& view, u32 instance, const Ray& giv
     if (moving) {
         closest_hit<P>(*moving, inside, time, &found, none);
     } else {
-        LocalStack<> stack;
-        closest_hit<P>(view.trees[entry.tree], inside, stack, &found, none);
+        const Primitives none_beside{};  // trees of single meshes hold triangles alone
+        closest_hit<P>(view.trees[entry.tree], none_beside, inside, &found, none);
     }
     if (found.ref == NONE) return no_scene_hit();
     return {found.t, found.ref, instance, found.u, found.v};
