@@ -201,6 +201,8 @@ inline unsigned __ballot_sync(unsigned mask, bool p) {
     for (int k = 0; k < 32; ++k) out |= unsigned(all[k] != 0) << k;
     return out;
 }
+// Fibers run one after the other: who comes somewhere comes alone.
+inline unsigned __activemask() { return 1u << threadIdx.x % 32; }
 inline bool __any_sync(unsigned mask, bool p) { return __ballot_sync(mask, p) != 0; }
 template <class T>
 T __shfl_sync(unsigned mask, T x, int lane) {

@@ -35,9 +35,9 @@ __device__ __forceinline__ void push_shadow(const RenderTask& task, u32 slot, co
     push_shadow(task.wave, ray, lane_time(points, 0), shadow, plan::VOLUMES && task.wave.media ? &media : nullptr);
 }
 
-__device__ __noinline__ void light_surface(const RenderTask& task, const PathState& path, u32 slot,
-                                           const ShadePoints& points, const ClosureSet& set,
-                                           const SurfacePoint& spawn) {
+__device__ __forceinline__ void light_surface(const RenderTask& task, const PathState& path, u32 slot,
+                                              const ShadePoints& points, const ClosureSet& set,
+                                              const SurfacePoint& spawn) {
     LightSample sample;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_LIGHT);
     if (!choose_light(task.scene, path, points, 0, set, u, &sample)) return;
@@ -49,8 +49,9 @@ __device__ __noinline__ void light_surface(const RenderTask& task, const PathSta
 }
 
 // The path's next ray, if it goes on.
-__device__ __noinline__ void send_on(const RenderTask& task, PathState& path, u32 slot, const ShadePoints& points,
-                                     const ClosureSet& set, const SurfacePoint& spawn, Vec3 direction, float distance) {
+__device__ __forceinline__ void send_on(const RenderTask& task, PathState& path, u32 slot, const ShadePoints& points,
+                                        const ClosureSet& set, const SurfacePoint& spawn, Vec3 direction,
+                                        float distance) {
     const Wavefront& wave = task.wave;
     Ray next;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);

@@ -85,6 +85,42 @@
 #ifndef LUCH_PLAN_TIME
 #define LUCH_PLAN_TIME 1
 #endif
+#ifndef LUCH_PLAN_COAT
+#define LUCH_PLAN_COAT 1
+#endif
+#ifndef LUCH_PLAN_METALS
+#define LUCH_PLAN_METALS 1
+#endif
+#ifndef LUCH_PLAN_CONDUCTORS
+#define LUCH_PLAN_CONDUCTORS 1
+#endif
+#ifndef LUCH_PLAN_TRANSMISSION
+#define LUCH_PLAN_TRANSMISSION 1
+#endif
+#ifndef LUCH_PLAN_THIN_WALLS
+#define LUCH_PLAN_THIN_WALLS 1
+#endif
+#ifndef LUCH_PLAN_ANISOTROPY
+#define LUCH_PLAN_ANISOTROPY 1
+#endif
+#ifndef LUCH_PLAN_BECKMANN
+#define LUCH_PLAN_BECKMANN 1
+#endif
+#ifndef LUCH_PLAN_ROUGH_DIFFUSE
+#define LUCH_PLAN_ROUGH_DIFFUSE 1
+#endif
+#ifndef LUCH_PLAN_CUBIC_IMAGES
+#define LUCH_PLAN_CUBIC_IMAGES 1
+#endif
+#ifndef LUCH_PLAN_HALF_IMAGES
+#define LUCH_PLAN_HALF_IMAGES 1
+#endif
+#ifndef LUCH_PLAN_FLOAT_IMAGES
+#define LUCH_PLAN_FLOAT_IMAGES 1
+#endif
+#ifndef LUCH_PLAN_MOST_LOBES
+#define LUCH_PLAN_MOST_LOBES 12  // Principled alone can make 8
+#endif
 
 namespace luch::plan {
 
@@ -117,6 +153,18 @@ inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin 
 inline constexpr bool VOLUMES = LUCH_PLAN_VOLUMES;
 inline constexpr bool MOTION = LUCH_PLAN_MOTION;  // of the camera, of objects, of their shapes
 inline constexpr bool TIME = LUCH_PLAN_TIME;      // the Render Time pass
+inline constexpr bool COAT = LUCH_PLAN_COAT;
+inline constexpr bool METALS = LUCH_PLAN_METALS;  // Metallic and Principled's metal, by the tint at 82 degrees
+inline constexpr bool CONDUCTORS = LUCH_PLAN_CONDUCTORS;  // by index and extinction
+inline constexpr bool TRANSMISSION = LUCH_PLAN_TRANSMISSION;  // microfacets that refract
+inline constexpr bool THIN_WALLS = LUCH_PLAN_THIN_WALLS;
+inline constexpr bool ANISOTROPY = LUCH_PLAN_ANISOTROPY;
+inline constexpr bool BECKMANN = LUCH_PLAN_BECKMANN;
+inline constexpr bool ROUGH_DIFFUSE = LUCH_PLAN_ROUGH_DIFFUSE;  // Oren and Nayar
+inline constexpr bool CUBIC_IMAGES = LUCH_PLAN_CUBIC_IMAGES;  // images looked up by cubic interpolation
+inline constexpr bool HALF_IMAGES = LUCH_PLAN_HALF_IMAGES;
+inline constexpr bool FLOAT_IMAGES = LUCH_PLAN_FLOAT_IMAGES;
+inline constexpr int MOST_LOBES = LUCH_PLAN_MOST_LOBES;  // at one point
 
 // A light that was chosen may have a program to ask for its emission.
 inline constexpr bool SAMPLED_PROGRAMS = EMISSION_PROGRAMS || LAMP_PROGRAMS || (WORLD_PROGRAM && WORLD_SAMPLING);

@@ -5,11 +5,13 @@ The rule is one-sided: code is left out only where no effect that needs it is on
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from luch.effects import Effects
+from luch.effects import effects_of
 from luch.effects.forcing import ALL
+from luch.effects.lobes import most_lobes, needs_of
+from luch.scene import Scene
 
 # Define -> effects that need it, by their names in luch.effects; a name that ends in * stands for all that begin so.
 NEEDED_BY: dict[str, tuple[str, ...]] = {
@@ -49,7 +51,6 @@ TOLD = {
 # Define -> operations of shader programs that make such lobes.
 MADE_BY: dict[str, tuple[str, ...]] = {
     "TOON": ("CLOSURE_TOON",),
-    "ASHIKHMIN_SHIRLEY": ("CLOSURE_GLOSSY",),
     "SUBSURFACE": ("CLOSURE_SUBSURFACE", "CLOSURE_PRINCIPLED_SUBSURFACE"),
     "MICROFACETS": (
         "CLOSURE_GLOSSY",
@@ -61,20 +62,41 @@ MADE_BY: dict[str, tuple[str, ...]] = {
         "CLOSURE_SUBSURFACE",
     ),
 }
+# Define -> what luch.effects.lobes says that some lobe or lookup may have.
+POSSIBLE = {
+    "COAT": "coat",
+    "METALS": "metals",
+    "CONDUCTORS": "conductors",
+    "TRANSMISSION": "transmission",
+    "THIN_WALLS": "thin walls",
+    "ANISOTROPY": "anisotropy",
+    "BECKMANN": "beckmann",
+    "ASHIKHMIN_SHIRLEY": "ashikhmin shirley",
+    "ROUGH_DIFFUSE": "rough diffuse",
+    "CUBIC_IMAGES": "cubic images",
+    "HALF_IMAGES": "half images",
+    "FLOAT_IMAGES": "float images",
+}
+MOST_LOBES = 12  # of plan.h, where general code keeps the likeliest
 
 
-def plan_of(
-    effects: Effects, operations: set[str], facts: Mapping[str, Any], forced: Iterable[str] = ()
-) -> dict[str, bool]:
-    """Which code a scene needs. operations: names of those that its programs hold. forced: Settings.force_effects."""
-    if ALL in forced:
-        return dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD], True)
-    plan = {define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()}
+def plan_of(scene: Scene, operations: set[str], facts: Mapping[str, Any]) -> dict[str, bool | int]:
+    """Which code a scene needs, and the number of lobes at a point at most. operations: names of those that its
+    programs hold; facts: core.render.Renderer.device_facts.
+    """
+    if ALL in scene.settings.force_effects:
+        return dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD, *POSSIBLE], True) | {"MOST_LOBES": MOST_LOBES}
+    effects, needs = effects_of(scene), needs_of(scene)
+    plan: dict[str, bool | int] = {
+        define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()
+    }
+    plan |= {define: name in needs for define, name in POSSIBLE.items()}
+    plan["MOST_LOBES"] = min(most_lobes(scene), MOST_LOBES)
     plan |= {define: bool(facts[name]) for define, name in TOLD.items()}
     plan |= {define: any(name in operations for name in names) for define, names in MADE_BY.items()}
     return plan
 
 
-def flags(plan: dict[str, bool]) -> list[str]:
+def flags(plan: Mapping[str, bool | int]) -> list[str]:
     """For the compiler."""
     return [f"-DLUCH_PLAN_{define}={int(needed)}" for define, needed in sorted(plan.items())]

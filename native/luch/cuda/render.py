@@ -312,7 +312,7 @@ class DeviceRenderer(HostFilm):
             else None
         )
         self._most_rounds = int(facts["most_rounds"])
-        self._media = facts["media"] and self._stages.plan["VOLUMES"]
+        self._media = facts["media"] and bool(self._stages.plan["VOLUMES"])
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
         self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]), facts["moves"])

@@ -12,7 +12,6 @@ from luch.cuda import compiler
 from luch.cuda import plan as plans
 from luch.cuda.device import DeviceError, Kernel, Module, architecture_of, cupy
 from luch.cuda.programs import INSTRUCTION, Linked, operations, source
-from luch.effects import effects_of
 from luch.scene import Scene
 
 STAGES = "RENDER_STAGES"
@@ -36,8 +35,7 @@ class SceneKernels:
             f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
             f"-DLUCH_STRUCTURE={structure}",
         ]
-        forced = scene.settings.force_effects
-        self.plan = plans.plan_of(effects_of(scene), operations(programs, instructions), facts, forced)
+        self.plan = plans.plan_of(scene, operations(programs, instructions), facts)
         self._flags += plans.flags(self.plan)
         self._precision = precision
         self._module: Module | None = None

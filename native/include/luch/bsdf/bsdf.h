@@ -51,7 +51,8 @@ LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
         case LobeType::DIFFUSE:
             return eval_diffuse(lobe, wi);
         case LobeType::OREN_NAYAR:
-            return eval_oren_nayar(lobe, wo, wi);
+            if constexpr (plan::ROUGH_DIFFUSE) return eval_oren_nayar(lobe, wo, wi);
+            break;
         case LobeType::TRANSLUCENT:
             return eval_translucent(lobe, wi);
         case LobeType::SHEEN:
@@ -96,10 +97,13 @@ LUCH_FN LobeValue eval_lobe(const Lobe& lobe, Vec3 n_smooth, Vec3 wo, Vec3 wi) {
     return value;
 }
 
+// Where no point has more than one lobe there are no loops over them.
+LUCH_FN int lobe_count(const ClosureSet& set) { return plan::MOST_LOBES == 1 ? int(set.count != 0) : set.count; }
+
 // Of all lobes: what a lobe's sample_weight is a share of.
 LUCH_FN float lobe_weight_sum(const ClosureSet& set) {
     float sum = 0.0f;
-    for (int i = 0; i < set.count; ++i) sum += set.lobes[i].sample_weight;
+    for (int i = 0; i < lobe_count(set); ++i) sum += set.lobes[i].sample_weight;
     return sum;
 }
 
@@ -107,7 +111,7 @@ LUCH_FN float lobe_weight_sum(const ClosureSet& set) {
 LUCH_FN_SLOW BsdfValue eval_closures(const ClosureSet& set, Vec3 /*n_geometric*/, Vec3 wo, Vec3 wi, float* pdf_sa) {
     BsdfValue value = {};
     float pdf_sum = 0.0f, weight_sum = 0.0f;
-    for (int i = 0; i < set.count; ++i) {
+    for (int i = 0; i < lobe_count(set); ++i) {
         const Lobe& lobe = set.lobes[i];
         weight_sum += lobe.sample_weight;
         LobeValue v = eval_lobe(lobe, set.n_smooth, wo, wi);
@@ -175,7 +179,7 @@ LUCH_FN_SLOW BsdfSample sample_closures(const ClosureSet& set, Vec3 n_geometric,
     BsdfSample out = {};
     if (set.count == 0) return out;
     float weight_sum = lobe_weight_sum(set);
-    int chosen = set.count > 1 ? choose_lobe(set, weight_sum, &u_lobe) : 0;
+    int chosen = plan::MOST_LOBES > 1 && set.count > 1 ? choose_lobe(set, weight_sum, &u_lobe) : 0;
     const Lobe& lobe = set.lobes[chosen];
     LobeSample s = sample_lobe(lobe, n_geometric, wo, u_lobe, u);
     if (!(s.pdf_sa > 0.0f)) return out;
@@ -194,7 +198,7 @@ LUCH_FN_SLOW BsdfSample sample_closures(const ClosureSet& set, Vec3 n_geometric,
     }
     add_to_class(out.value, out.lobe_class, s.f * lobe.weight);
     float pdf_sum = s.pdf_sa * lobe.sample_weight;
-    for (int i = 0; i < set.count; ++i) {
+    for (int i = 0; i < lobe_count(set); ++i) {
         if (i == chosen) continue;
         const Lobe& other = set.lobes[i];
         LobeValue v = eval_lobe(other, set.n_smooth, wo, s.direction);
@@ -209,7 +213,7 @@ LUCH_FN_SLOW BsdfSample sample_closures(const ClosureSet& set, Vec3 n_geometric,
 
 // Filter Glossy: no lobe is sharper than `roughness` (alpha) after a blurring bounce.
 LUCH_FN void blur_closures(ClosureSet& set, float roughness) {
-    for (int i = 0; i < set.count; ++i) {
+    for (int i = 0; i < lobe_count(set); ++i) {
         Lobe& lobe = set.lobes[i];
         if (lobe.type < LobeType::MICROFACET_REFLECTION) continue;
         if (!(min_f(lobe.alpha_x, lobe.alpha_y) < roughness)) continue;
@@ -223,7 +227,7 @@ LUCH_FN void blur_closures(ClosureSet& set, float roughness) {
 // What the lobes reflect and transmit of a white surrounding: the Color passes.
 LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 wo) {
     BsdfValue value = {};
-    for (int i = 0; i < set.count; ++i) {
+    for (int i = 0; i < lobe_count(set); ++i) {
         const Lobe& lobe = set.lobes[i];
         if (lobe.type < LobeType::MICROFACET_REFLECTION) {
             add_to_class(value, lobe_class(lobe, lobe.normal), lobe.weight);
@@ -242,7 +246,7 @@ LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 wo) {
 
 // Whether a direction from elsewhere can find a lobe: mirrors can only be sampled.
 LUCH_FN bool has_smooth_lobe(const ClosureSet& set) {
-    for (int i = 0; i < set.count; ++i) {
+    for (int i = 0; i < lobe_count(set); ++i) {
         const Lobe& lobe = set.lobes[i];
         if (plan::SUBSURFACE && is_subsurface(lobe.type)) continue;  // light is looked for where it comes out
         if (lobe.type == LobeType::ASHIKHMIN_SHIRLEY
@@ -256,7 +260,7 @@ LUCH_FN bool has_smooth_lobe(const ClosureSet& set) {
 // Mean normal of the lobes by weight: the Denoising Normal pass.
 LUCH_FN Vec3 shading_normal(const ClosureSet& set, Vec3 fallback) {
     Vec3 sum = make_vec3(0.0f);
-    for (int i = 0; i < set.count; ++i) sum += set.lobes[i].normal * average(set.lobes[i].weight);
+    for (int i = 0; i < lobe_count(set); ++i) sum += set.lobes[i].normal * average(set.lobes[i].weight);
     return normalize_or(sum, fallback);
 }
 

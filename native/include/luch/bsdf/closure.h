@@ -2,10 +2,9 @@
 // the integrator evaluates and samples the list. One lobe model is one header beside this one.
 #pragma once
 #include "luch/math/vec.h"
+#include "luch/plan.h"
 
 namespace luch {
-
-inline constexpr int MAX_LOBES = 12;  // Principled alone can make 8
 
 enum class LobeType : u8 {
     NONE_,
@@ -72,7 +71,7 @@ struct ClosureSet {
     Color transparent;  // straight-through transmission, sum of Transparent closures
     Vec3 n_smooth;      // interpolated normal before bump, set with every lobe
     float holdout;      // weight of Holdout closures
-    Lobe lobes[MAX_LOBES];
+    Lobe lobes[plan::MOST_LOBES];
 };
 
 // Reflected radiance per class for unit incident radiance, times |cos|.

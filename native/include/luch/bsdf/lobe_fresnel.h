@@ -18,9 +18,9 @@ struct FresnelTerm {
     float cos_t;  // cosine of the refracted ray, positive; undefined where nothing is transmitted
 };
 
-LUCH_FN bool can_reflect(const Lobe& l) { return l.type != LobeType::MICROFACET_REFRACTION; }
+LUCH_FN bool can_reflect(const Lobe& l) { return !plan::TRANSMISSION || l.type != LobeType::MICROFACET_REFRACTION; }
 LUCH_FN bool can_transmit(const Lobe& l) {
-    return l.type == LobeType::MICROFACET_REFRACTION || l.type == LobeType::MICROFACET_GLASS;
+    return plan::TRANSMISSION && (l.type == LobeType::MICROFACET_REFRACTION || l.type == LobeType::MICROFACET_GLASS);
 }
 LUCH_FN bool has_film(const Lobe& l) { return plan::THIN_FILM && l.thin_film_thickness > FILM_MIN_THICKNESS_NM; }
 
@@ -53,14 +53,17 @@ LUCH_FN FresnelTerm fresnel_term(const Lobe& l, float cos_i) {
             break;
         }
         case Fresnel::DIELECTRIC:
+            if constexpr (!plan::COAT) break;
             f.reflected = make_vec3(fresnel_dielectric(cos_i, l.ior, &f.cos_t));
             f.transmitted = one - f.reflected;
             break;
         case Fresnel::CONDUCTOR:
+            if constexpr (!plan::CONDUCTORS) return f;
             f.reflected = has_film(l) ? film_over_metal(l.thin_film_thickness, l.thin_film_ior, l.c0, l.c1, cos_i)
                                       : fresnel_conductor(cos_i, l.c0, l.c1);
             return f;
         case Fresnel::F82_TINT:
+            if constexpr (!plan::METALS) return f;
             f.reflected = has_film(l) ? film_over_f82(l.thin_film_thickness, l.thin_film_ior, l.c0, l.c1, cos_i)
                                       : fresnel_f82(cos_i, l.c0, l.c1);
             return f;
@@ -86,8 +89,9 @@ LUCH_FN_SLOW FresnelTerm lobe_albedo(const Lobe& l, Vec3 wo) {
         Color r = mix(l.c0, one, dielectric_place(roughness, mu, l.ior));
         return {r * l.c1, (one - r) * l.c2, 1.0f};
     }
-    if (l.fresnel == Fresnel::F82_TINT && !has_film(l)) return {mix(l.c0, one, metal_place(roughness, mu)), none, 1.0f};
-    if (l.fresnel == Fresnel::DIELECTRIC && l.ior > 1.0f) {
+    if (plan::METALS && l.fresnel == Fresnel::F82_TINT && !has_film(l))
+        return {mix(l.c0, one, metal_place(roughness, mu)), none, 1.0f};
+    if (plan::COAT && l.fresnel == Fresnel::DIELECTRIC && l.ior > 1.0f) {
         float r = mix_f(f0_from_ior(l.ior), 1.0f, dielectric_place(roughness, mu, l.ior));
         return {make_vec3(r), can_transmit(l) ? make_vec3(1.0f - r) : none, 1.0f};
     }

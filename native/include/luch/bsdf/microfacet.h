@@ -17,7 +17,7 @@ inline constexpr float MIRROR_ALPHA2 = 2e-10f;
 inline constexpr float STRAIGHT_IOR = 1e-4f;
 
 LUCH_FN bool is_mirror(const Lobe& l) { return l.alpha_x * l.alpha_y <= MIRROR_ALPHA2; }
-LUCH_FN bool is_anisotropic(const Lobe& l) { return l.alpha_x != l.alpha_y; }
+LUCH_FN bool is_anisotropic(const Lobe& l) { return plan::ANISOTROPY && l.alpha_x != l.alpha_y; }
 
 struct Frame {
     Vec3 t, b, n;
@@ -76,14 +76,13 @@ LUCH_FN float cap_bound(const Lobe& l, float cos_o) {
     float s2 = sqr(1.0f + safe_sqrt(1.0f - cos2));
     return (1.0f - a2) * s2 / (s2 + a2 * cos2);
 }
-LUCH_FN bool uses_cap_bound(const Lobe& l) {
-    return l.type == LobeType::MICROFACET_REFLECTION && l.distribution == Distribution::GGX;
-}
+LUCH_FN bool is_ggx(const Lobe& l) { return !plan::BECKMANN || l.distribution == Distribution::GGX; }
+LUCH_FN bool uses_cap_bound(const Lobe& l) { return l.type == LobeType::MICROFACET_REFLECTION && is_ggx(l); }
 
 LUCH_FN Facets facets(const Lobe& l, const FacetAngles& a) {
     Facets f;
     float a2 = l.alpha_x * l.alpha_y;
-    if (l.distribution == Distribution::GGX) {
+    if (is_ggx(l)) {
         f.density = INV_PI / (a2 * sqr(a.sin2_h + sqr(a.cos_h)));
         float t_o = sqrt_f(sqr(a.cos_o) + a.sin2_o), t_i = sqrt_f(sqr(a.cos_i) + a.sin2_i), c_i = abs_f(a.cos_i);
         f.g1 = 2.0f / ((uses_cap_bound(l) ? cap_bound(l, a.cos_o) : 1.0f) * a.cos_o + t_o);
@@ -151,9 +150,8 @@ LUCH_FN_SLOW LobeSample sample_microfacet(const Lobe& l, Vec3 n_geometric, Vec3 
     bool mirror = is_mirror(l);
     Vec3 h = {0.0f, 0.0f, 1.0f};
     if (!mirror) {
-        h = l.distribution == Distribution::GGX
-                ? sample_visible_ggx(l, o, uses_cap_bound(l) ? cap_bound(l, o.z) : 1.0f, u)
-                : sample_visible_beckmann(o, l.alpha_x, l.alpha_y, u);
+        h = is_ggx(l) ? sample_visible_ggx(l, o, uses_cap_bound(l) ? cap_bound(l, o.z) : 1.0f, u)
+                      : sample_visible_beckmann(o, l.alpha_x, l.alpha_y, u);
     }
     float cos_ho = dot(h, o);
     FresnelTerm fresnel = fresnel_term(l, cos_ho);

@@ -47,7 +47,7 @@ LUCH_FN PrincipledSurface read_principled(const PrincipledParams& p, const Setup
 
 LUCH_FN Color layer_sheen(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float amount = max_f(s.p.sheen_weight, 0.0f);
-    if (!(amount > LOBE_WEIGHT_CUTOFF)) return weight;
+    if (!plan::SHEEN || !(amount > LOBE_WEIGHT_CUTOFF)) return weight;
     Color tint = max_v(s.p.sheen_tint, make_vec3(0.0f));
     Vec3 n = normalize_or(mix(s.n, s.coat_n, saturate_f(s.p.coat_weight)), s.n);
     Lobe lobe;
@@ -67,7 +67,7 @@ LUCH_FN Color coat_absorption(Color tint, float ior, float amount, float cos_i) 
 
 LUCH_FN Color layer_coat(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float amount = max_f(s.p.coat_weight, 0.0f);
-    if (!(amount > LOBE_WEIGHT_CUTOFF)) return weight;
+    if (!plan::COAT || !(amount > LOBE_WEIGHT_CUTOFF)) return weight;
     float ior = clamp_f(s.p.coat_ior, 1.0f, 1e6f);
     Vec3 n = specular_normal(s.coat_n, s.c);
     Lobe lobe;
@@ -87,7 +87,7 @@ LUCH_FN Color layer_coat(ClosureSet& set, Color weight, const PrincipledSurface&
 
 LUCH_FN Color mix_metal(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float metallic = saturate_f(s.p.metallic);
-    if (!(metallic > LOBE_WEIGHT_CUTOFF)) return weight;
+    if (!plan::METALS || !(metallic > LOBE_WEIGHT_CUTOFF)) return weight;
     Lobe lobe;
     if (allows_reflective_caustics(s.c) &&
         start_lobe(lobe, LobeType::MICROFACET_REFLECTION, metallic * weight, s.specular_n, s.c)) {
@@ -106,12 +106,12 @@ LUCH_FN Color mix_metal(ClosureSet& set, Color weight, const PrincipledSurface& 
 
 LUCH_FN Color mix_glass(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float amount = saturate_f(s.p.transmission_weight);
-    if (!(amount > LOBE_WEIGHT_CUTOFF)) return weight;
+    if (!plan::TRANSMISSION || !(amount > LOBE_WEIGHT_CUTOFF)) return weight;
     bool reflects = allows_reflective_caustics(s.c), refracts = allows_refractive_caustics(s.c);
     Color through = {sqrt_f(s.clamped_base.x), sqrt_f(s.clamped_base.y), sqrt_f(s.clamped_base.z)};
     Lobe lobe;
     if (!reflects && !refracts) {
-    } else if (s.p.thin_wall) {
+    } else if (plan::THIN_WALLS && s.p.thin_wall) {
         ThinGlass sheet = {s.ior, sqr(s.roughness), s.film_thickness, s.film_ior, s.specular_tint, s.clamped_base};
         setup_thin_glass(set, amount * weight, sheet, s.specular_n, s.c);
     } else if (start_lobe(lobe, LobeType::MICROFACET_GLASS, amount * weight, s.specular_n, s.c)) {
@@ -175,7 +175,7 @@ LUCH_FN void scatter_inside(ClosureSet& set, Color weight, float level_ior, cons
 
 LUCH_FN void base_diffuse(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float subsurface = saturate_f(s.p.subsurface_weight), roughness = saturate_f(s.p.diffuse_roughness);
-    if (subsurface > LOBE_WEIGHT_CUTOFF && s.p.thin_wall) {  // where it is exact
+    if (subsurface > LOBE_WEIGHT_CUTOFF && plan::THIN_WALLS && s.p.thin_wall) {  // where it is exact
         setup_thin_subsurface(set, s.clamped_base * weight * subsurface, s.p.subsurface_anisotropy, roughness,
                               s.clamped_base, s.n, s.c);
         weight *= 1.0f - subsurface;
@@ -185,7 +185,8 @@ LUCH_FN void base_diffuse(ClosureSet& set, Color weight, const PrincipledSurface
     }
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::DIFFUSE, s.base * weight, s.n, s.c)) return;
-    if (roughness >= OREN_NAYAR_MIN_ROUGHNESS) prepare_oren_nayar(lobe, s.base, dot(s.n, s.c.wo), roughness);
+    if (plan::ROUGH_DIFFUSE && roughness >= OREN_NAYAR_MIN_ROUGHNESS)
+        prepare_oren_nayar(lobe, s.base, dot(s.n, s.c.wo), roughness);
     add_lobe(set, lobe, s.c);
 }
 

@@ -16,7 +16,8 @@ LUCH_FN void setup_diffuse(ClosureSet& set, Color weight, Color color, float rou
                            const SetupContext& c) {
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::DIFFUSE, weight * color, closure_normal(normal, c), c)) return;
-    if (roughness >= OREN_NAYAR_MIN_ROUGHNESS) prepare_oren_nayar(lobe, color, dot(lobe.normal, c.wo), roughness);
+    if (plan::ROUGH_DIFFUSE && roughness >= OREN_NAYAR_MIN_ROUGHNESS)
+        prepare_oren_nayar(lobe, color, dot(lobe.normal, c.wo), roughness);
     add_lobe(set, lobe, c);
 }
 

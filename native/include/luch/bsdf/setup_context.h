@@ -61,9 +61,9 @@ LUCH_FN void add_lobe(ClosureSet& set, const Lobe& lobe, const SetupContext& c) 
     set.n_smooth = c.n;
     if (!wants_lobes(c) || !(lobe.sample_weight > 0.0f)) return;
     int slot = set.count;
-    if (slot == MAX_LOBES) {
+    if (slot == plan::MOST_LOBES) {
         slot = 0;
-        for (int i = 1; i < MAX_LOBES; ++i)
+        for (int i = 1; i < plan::MOST_LOBES; ++i)
             if (set.lobes[i].sample_weight < set.lobes[slot].sample_weight) slot = i;
         if (!(lobe.sample_weight > set.lobes[slot].sample_weight)) return;
     } else {

@@ -14,10 +14,10 @@ LUCH_FN float valid_ior(float ior) { return clamp_f(ior, 1e-5f, 1e6f); }
 // Source: Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks", appendix.
 LUCH_FN void compensate_energy(Lobe& lobe, Vec3 wo, Color mean_fresnel) {
     // Facets between equal media do not exist: straight light loses nothing that could be put back.
-    if (lobe.type == LobeType::MICROFACET_GLASS && abs_f(lobe.ior - 1.0f) < STRAIGHT_IOR) return;
+    if (plan::TRANSMISSION && lobe.type == LobeType::MICROFACET_GLASS && abs_f(lobe.ior - 1.0f) < STRAIGHT_IOR) return;
     float mu = dot(wo, lobe.normal), roughness = table_roughness(lobe.alpha_x, lobe.alpha_y);
-    Albedo e = lobe.type == LobeType::MICROFACET_GLASS ? glass_albedo(roughness, mu, lobe.ior)
-                                                       : reflection_albedo(roughness, mu);
+    Albedo e = plan::TRANSMISSION && lobe.type == LobeType::MICROFACET_GLASS ? glass_albedo(roughness, mu, lobe.ior)
+                                                                             : reflection_albedo(roughness, mu);
     float lost = (1.0f - e.directional) / e.directional;
     lobe.energy_scale = 1.0f + lost;
     const Color one = make_vec3(1.0f);
@@ -58,7 +58,7 @@ LUCH_FN void set_metal_roughness(Lobe& lobe, float roughness, float anisotropy, 
                                  Vec3 axis) {
     float alpha = sqr(roughness), aspect = sqrt_f(1.0f - 0.9f * anisotropy);
     make_isotropic(lobe, alpha);
-    if (anisotropy > 0.0f && !is_zero(tangent) && set_tangent(lobe, tangent, axis, rotation))
+    if (plan::ANISOTROPY && anisotropy > 0.0f && !is_zero(tangent) && set_tangent(lobe, tangent, axis, rotation))
         set_roughness(lobe, alpha / aspect, alpha * aspect);
 }
 
@@ -75,11 +75,12 @@ LUCH_FN_SLOW void setup_glossy(ClosureSet& set, Color weight, const GlossyParams
     lobe.ior = 1.0f;
     float alpha = sqr(saturate_f(p.roughness)), a = clamp_f(p.anisotropy, -0.99f, 0.99f);
     make_isotropic(lobe, alpha);
-    if (abs_f(a) > 1e-4f && !is_zero(p.tangent) && set_tangent(lobe, p.tangent, lobe.normal, p.rotation)) {
+    if (plan::ANISOTROPY && abs_f(a) > 1e-4f && !is_zero(p.tangent) &&
+        set_tangent(lobe, p.tangent, lobe.normal, p.rotation)) {
         float shrink = 1.0f - abs_f(a);
         set_roughness(lobe, a < 0.0f ? alpha / shrink : alpha * shrink, a < 0.0f ? alpha * shrink : alpha / shrink);
     }
-    if (p.distribution == Microfacets::ASHIKHMIN_SHIRLEY) {
+    if (plan::ASHIKHMIN_SHIRLEY && p.distribution == Microfacets::ASHIKHMIN_SHIRLEY) {
         lobe.type = LobeType::ASHIKHMIN_SHIRLEY;
         lobe.alpha_x = max_f(lobe.alpha_x, PHONG_MIN_ALPHA);
         lobe.alpha_y = max_f(lobe.alpha_y, PHONG_MIN_ALPHA);
@@ -102,7 +103,7 @@ LUCH_FN_SLOW void setup_metallic(ClosureSet& set, Color weight, const MetallicPa
     set_film(lobe, p.thin_film_thickness, p.thin_film_ior);
     if (p.distribution == Microfacets::BECKMANN) lobe.distribution = Distribution::BECKMANN;
     Color mean_fresnel;
-    if (p.physical) {
+    if (plan::CONDUCTORS && p.physical) {
         lobe.fresnel = Fresnel::CONDUCTOR;
         lobe.c0 = max_v(p.ior, none);
         lobe.c1 = max_v(p.extinction, none);

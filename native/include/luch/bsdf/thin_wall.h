@@ -83,7 +83,7 @@ LUCH_FN_SLOW void setup_thin_subsurface(ClosureSet& set, Color weight, float ani
                                         Vec3 normal, const SetupContext& c) {
     Color reflected = saturate_f(0.5f * (1.0f - anisotropy)) * weight;
     Color transmitted = saturate_f(0.5f * (1.0f + anisotropy)) * weight;
-    bool rough = roughness >= OREN_NAYAR_MIN_ROUGHNESS;
+    bool rough = plan::ROUGH_DIFFUSE && roughness >= OREN_NAYAR_MIN_ROUGHNESS;
     Lobe lobe;
     if (start_lobe(lobe, LobeType::DIFFUSE, reflected, normal, c)) {
         if (rough) prepare_oren_nayar(lobe, color, dot(normal, c.wo), roughness);

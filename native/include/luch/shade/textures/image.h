@@ -112,6 +112,7 @@ LUCH_FN Texel interpolate_image(const ImageView& image, float x, float y, Interp
         const float wx[2] = {1.0f - fx, fx}, wy[2] = {1.0f - fy, fy};
         return blend_texels<Stored, 2>(image, ix, iy, wx, wy, extension);
     }
+    if constexpr (!plan::CUBIC_IMAGES) return {};
     float wx[4], wy[4];
     cubic_weights(fx, wx);
     cubic_weights(fy, wy);
@@ -122,8 +123,11 @@ LUCH_FN Texel interpolate_image(const ImageView& image, float x, float y, Interp
 LUCH_FN_SLOW Texel look_up_image(const ImageView& image, float u, float v, Interpolation interpolation,
                                  Extension extension) {
     const float x = u * float(image.width), y = v * float(image.height);
-    if (image.format == PixelFormat::U8) return interpolate_image<u8>(image, x, y, interpolation, extension);
-    if (image.format == PixelFormat::F16) return interpolate_image<u16>(image, x, y, interpolation, extension);
+    if (!(plan::HALF_IMAGES || plan::FLOAT_IMAGES) || image.format == PixelFormat::U8)
+        return interpolate_image<u8>(image, x, y, interpolation, extension);
+    if (plan::HALF_IMAGES && image.format == PixelFormat::F16)
+        return interpolate_image<u16>(image, x, y, interpolation, extension);
+    if constexpr (!plan::FLOAT_IMAGES) return {};
     return interpolate_image<float>(image, x, y, interpolation, extension);
 }
 
