@@ -175,6 +175,7 @@ py::dict task_fields() {
     LUCH_FIELD(wave.shadows);
     LUCH_FIELD(wave.shadow_kind);
     LUCH_FIELD(wave.blocked);
+    LUCH_FIELD(wave.see_through);
     LUCH_FIELD(wave.walks);
     LUCH_FIELD(wave.aovs);
     LUCH_FIELD(wave.media);
@@ -210,6 +211,13 @@ py::dict task_sizes() {
     return sizes;
 }
 
+// Where luch/cuda/upload.py finds what it needs of luch::ImageView.
+py::dict image_layout() {
+    return py::dict(py::arg("size") = sizeof(ImageView), py::arg("pixels") = offsetof(ImageView, pixels),
+                    py::arg("width") = offsetof(ImageView, width), py::arg("height") = offsetof(ImageView, height),
+                    py::arg("tiles_across") = offsetof(ImageView, tiles_across), py::arg("tile") = IMAGE_TILE);
+}
+
 }  // namespace
 
 void bind_render(py::module_& m) {
@@ -217,6 +225,7 @@ void bind_render(py::module_& m) {
     render.def("task_fields", &task_fields);
     render.def("task_sizes", &task_sizes);
     render.def("forcible_effects", &forcible_effects);
+    render.def("image_layout", &image_layout);
     py::class_<PyRenderer>(render, "Renderer")
         .def(py::init<const py::object&, bool, std::optional<u64>>(), py::arg("scene"), py::arg("for_device") = false,
              py::arg("device_builds_from") = py::none(),

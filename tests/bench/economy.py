@@ -1,6 +1,6 @@
 """What an effect costs that the scene lacks, and what one saves that the user leaves out: time, bytes, code.
 
-  build.py bench economy [SCENE.luch ...] [--device CUDA] [--samples 16] [--rounds 9] [--only NAME ...]
+  build.py bench economy [SCENE.luch ...] [--device CUDA] [--samples 16] [--rounds 9] [--only NAME ...] [--docs]
 
 Default scene: the repository's demo. Renders of one process in turns (lean, other, lean, other, ...), so that a slow
 moment hits both; the ratio of each pair's seconds, its median and a 95 % interval from the order of the pairs (the
@@ -11,12 +11,14 @@ binomial one of the median).
   left out effects that the scene has, left out (Settings.without_effects): what they cost, and how much of the picture
            they are (relMSE against the whole, noise included)
 
-On CUDA the kernels' code is told, too: registers, local bytes and size of shade_surfaces. Writes out/bench/economy.json.
+On CUDA the kernels' code is told, too: registers and local bytes of shade_surfaces, bytes of all stages. Every row is
+kept in tests/bench/records/economy-DEVICE.json; --docs writes the tables of docs/effects.md from both devices' records.
 """
 
 from __future__ import annotations
 
 import argparse
+import datetime
 import json
 import sys
 from dataclasses import replace
@@ -24,8 +26,9 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "native"), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "native"), str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
+import economy_page  # noqa: E402
 import numpy as np  # noqa: E402
 from luch.effects import effects_of  # noqa: E402
 from luch.effects.forcing import ALL, forcible  # noqa: E402
@@ -97,6 +100,15 @@ def asking(scene: Scene, **settings: Any) -> Scene:
     return replace(scene, settings=replace(scene.settings, **settings))
 
 
+def keep(device: str, scene: str, kind: str, name: str, row: dict[str, Any]) -> None:
+    """Puts a row into the device's record, in place of the last of its name."""
+    file = economy_page.record_of(device)
+    record = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    where = {"date": datetime.date.today().isoformat(), "commit": economy_page.commit()}
+    record.setdefault(scene, {}).setdefault(kind, {})[name] = row | where
+    file.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
 def race(path: Path, options: argparse.Namespace) -> dict[str, Any]:
     """One scene's tables."""
     scene = asking(read_scene(path), samples=options.samples, time_limit=0.0, device=options.device)
@@ -115,6 +127,7 @@ def race(path: Path, options: argparse.Namespace) -> dict[str, Any]:
             code = "".join(
                 f", {field} {row['code'][0][field]:g} -> {value:g}" for field, value in row["code"][1].items()
             )
+            keep(options.device, path.stem, kind, name, row)
             print(f"{path.stem:20} {kind:9} {name:24} {told}  {picture}{more}{code}", flush=True)
     return rows
 
@@ -128,10 +141,13 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--only", nargs="+", metavar="NAME")
+    parser.add_argument("--docs", action="store_true", help="write docs/effects.md from the records, measure nothing")
     options = parser.parse_args()
+    if options.docs:
+        economy_page.write()
+        return 0
     OUT.mkdir(parents=True, exist_ok=True)
     tables = [race(path, options) for path in options.scenes or [demo()]]
-    (OUT / f"economy-{options.device.lower()}.json").write_text(json.dumps(tables, indent=1) + "\n", encoding="utf-8")
     return int(any(not row["same_bits"] for table in tables for row in table["idle"].values()))
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from luch._native import core
-from luch.cuda.render import MARK_CHANNELS, NONE, Memory, parted
+from luch.cuda.memory import MARK_CHANNELS, NONE, Memory
+from luch.cuda.render import parted
 from luch.scene import Film
 
 

@@ -68,6 +68,6 @@ LUCH_STAGE(shade_surfaces) {
     using namespace luch;
     u32 entry = stage_index();
     bool shaded = entry < task.wave.counters[WAVE_HITS] && shade_entry(task, entry);
-    u32 count = u32(__syncthreads_count(shaded));
-    if (threadIdx.x == 0) add_total(task.wave, TOTAL_SURFACE_POINTS, count);
+    u32 count = u32(popcount(__ballot_sync(0xffffffffu, shaded)));
+    if (threadIdx.x % 32u == 0) add_total(task.wave, TOTAL_SURFACE_POINTS, count);
 }

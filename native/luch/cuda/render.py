@@ -20,14 +20,18 @@ from luch._native import core
 from luch.adaptive import parts, regions_of
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
+from luch.cuda.memory import Beside, Memory, bytes_per_path
 from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.timing import TIMED, StageClocks
 from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
-from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, too_large
+from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, tiled, too_large
 
 BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
-# Paths under way at once. Fewer leave a large GPU idle in late bounces, more only cost memory.
-MOST_PATHS = 1 << 21
+# Paths under way at once, for each multiprocessor, rounded down to a power of two. Late bounces of few paths leave a GPU
+# idle: on an H100 (132 of them) waves of 2, 4, 8 and 16 million took 4.9, 3.6, 3.0 and 2.8 s for little_lamp, 12.2, 10.1,
+# 9.1 and 8.8 s for white_room. More only cost memory and time until a cancel is heard, which is a wave's.
+PATHS_OF_MULTIPROCESSOR = 1 << 16
+MOST_PATHS = 1 << 24
 FEWEST_PATHS = 1 << 14
 # Groups of so many triangles get their tree from the GPU: a million take 10 ms there and 1.7 s on a processor.
 DEVICE_BUILDS_FROM = 20_000
@@ -36,137 +40,12 @@ MEMORY_SHARE = 0.85
 # Part of the free memory that a scene may take; film and paths want some, too.
 SCENE_SHARE = 0.8
 TREE_BYTES = 200  # of a triangle whose tree the device builds: its corners, its node's share, the builder's work space
-NONE = 0xFFFFFFFF  # of luch/platform.h: not there
-MARK_CHANNELS = 4  # of luch/film/film.h
-RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
-COUNTERS = ("rays", "next_rays", "shadows", "hits", "traced", "shadowed", "walks", "walked")  # WaveCounter
 TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
           "light_points", "subsurface_walks", "subsurface_steps", "flights", "clamped_units", "cut_units")  # WaveTotal  # fmt: skip
 
 
 # Pixels of the film, in order (None: all), and their samples: the first and how many.
 Part = tuple[Any, int, int]
-
-
-class Memory:
-    """The film and the wavefront on the device, and their places in the RenderTask."""
-
-    def __init__(
-        self, task: bytes, pixels: int, materials: int, paths: int, walks: bool, media: bool, moves: bool
-    ) -> None:
-        """walks: paths may go under surfaces; media: and through volumes; moves: at times of their own."""
-        cp, fields, sizes = cupy(), core.render.task_fields(), core.render.task_sizes()
-        self._fields, self._task = fields, bytearray(task)
-        stride = self.field("film.layout.stride", "<I")
-        aovs = self.field("film.layout.aov_count", "<I")
-        self.timed = self.field("film.layout.time", "<I") != NONE
-        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE) + walks + media
-        self.layer_pixels = min(pixels, paths)
-        self.layers = max(1, paths // pixels)
-        slots = self.slots = self.layer_pixels * self.layers
-        self.pixels, self.stride = pixels, stride
-
-        def empty(count: int, kind: Any = np.uint8) -> Any:
-            return cp.empty(count, kind)
-
-        self.rows = cp.zeros((self.layers, pixels, stride), np.float64)
-        self.counts = cp.zeros((self.layers, pixels), np.uint32)
-        self.counters, self.totals = cp.zeros(sizes["counters"], np.uint32), cp.zeros(sizes["totals"], np.uint64)
-        self.arrays = {
-            "paths": empty(slots * sizes["path"]),
-            "rays": empty(slots * sizes["ray"]),
-            "ray_slot": empty(slots, np.uint32),
-            "ray_kind": empty(slots, np.uint32),
-            "next_rays": empty(slots * sizes["ray"]),
-            "next_slot": empty(slots, np.uint32),
-            "next_kind": empty(slots, np.uint32),
-            "hits": empty(slots * sizes["hit"]),
-            "sorted": empty(slots, np.uint32),
-            "material_first": cp.zeros(materials, np.uint32),
-            "shadow_rays": empty(slots * shadows * sizes["ray"]),
-            "shadows": empty(slots * shadows * sizes["shadow"]),
-            "shadow_kind": cp.full(slots * shadows, RAY_SHADOW, np.uint32),
-            "blocked": empty(slots * shadows),
-            "counters": self.counters,
-            "totals": self.totals,
-        }
-        if walks:
-            self.arrays["walks"] = empty(slots * sizes["walk"])
-        if moves:
-            self.arrays |= {
-                "ray_time": empty(slots, np.float32),
-                "next_time": empty(slots, np.float32),
-                "shadow_time": empty(slots * shadows, np.float32),
-            }
-        if self.timed:
-            self.arrays |= {
-                "ticks": cp.zeros((sizes["clocks"], slots), np.uint32),
-                "ray_ticks": empty(slots, np.uint32),
-                "shadow_ticks": empty(slots * shadows, np.uint32),
-            }
-        if aovs:
-            self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
-        if media:
-            self.arrays["media"] = empty(slots * sizes["media"])
-            self.arrays["shadow_media"] = empty(slots * shadows * sizes["media"])
-        self._set("film.rows", "<Q", self.rows.data.ptr)
-        self._set("film.sample_counts", "<Q", self.counts.data.ptr)
-        self._set("wave.slots", "<I", slots)
-        self._set("wave.layer_pixels", "<I", self.layer_pixels)
-        self._set("wave.layer_stride", "<Q", pixels * stride)
-        self._set("wave.film_pixels", "<I", pixels)
-        for name, array in self.arrays.items():
-            self._set(f"wave.{name}", "<Q", array.data.ptr)
-        self.tasks = [bytes(self._task), b""]
-        for name in ("rays", "slot", "kind", *(("time",) if moves else ())):
-            own, following = ("rays", "next_rays") if name == "rays" else (f"ray_{name}", f"next_{name}")
-            self._set(f"wave.{own}", "<Q", self.arrays[following].data.ptr)
-            self._set(f"wave.{following}", "<Q", self.arrays[own].data.ptr)
-        self.tasks[1] = bytes(self._task)
-
-    def field(self, name: str, kind: str) -> int:
-        """A number of the task."""
-        value: int = struct.unpack_from(kind, self._task, self._fields[name])[0]
-        return value
-
-    def _set(self, name: str, kind: str, value: int) -> None:
-        struct.pack_into(kind, self._task, self._fields[name], value)
-
-    def address(self, name: str) -> int:
-        """Of an array on the device; 0 if this scene needs no such array."""
-        return int(self.arrays[name].data.ptr) if name in self.arrays else 0
-
-    def counter(self, name: str) -> int:
-        """Address of one of WaveCounter."""
-        return int(self.counters.data.ptr) + 4 * COUNTERS.index(name)
-
-    def clear(self, *names: str) -> None:
-        """Sets some of WaveCounter to 0, on the device."""
-        for index in map(COUNTERS.index, names):
-            self.counters[index : index + 1].fill(0)
-
-    def count(self, name: str) -> int:
-        """Of one of WaveCounter; waits for the device."""
-        index = COUNTERS.index(name)
-        return int(self.counters[index : index + 1].get()[0])
-
-    def mark(self, sample: int, pixels: Any = None) -> None:
-        """As film_mark of luch/film/film.h, of every layer and pixel (or of those in a list on the device).
-
-        To be called before that sample.
-        """
-        marks = self.field("film.layout.marks", "<I")
-        if marks == NONE or sample == 0 or sample & (sample - 1):
-            return
-        channel = marks + (0 if sample & 0x55555555 else MARK_CHANNELS)
-        those = slice(None) if pixels is None else pixels
-        self.rows[:, those, channel : channel + 3] = self.rows[:, those, :3]  # Combined comes first
-        self.rows[:, those, channel + 3] = self.counts[:, those]
-
-    @property
-    def bytes(self) -> int:
-        """All of it."""
-        return int(self.rows.nbytes + self.counts.nbytes + sum(array.nbytes for array in self.arrays.values()))
 
 
 def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
@@ -176,19 +55,6 @@ def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
         count = min(most, end - first, (1 << first.bit_length()) - first)
         yield first, count
         first += count
-
-
-def bytes_per_path(
-    stride: int, pixels: int, walks: bool = False, media: bool = False, moves: bool = False, timed: bool = False
-) -> float:
-    """Device memory of one path under way: its state, its queues, and its part of a layer of the film."""
-    sizes = core.render.task_sizes()
-    shadow = sizes["ray"] + sizes["shadow"] + 5 + media * sizes["media"]
-    queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + (2 + walks + media) * shadow
-    beside = walks * sizes["walk"] + media * sizes["media"]
-    times = 4 * (4 + walks + media) * moves
-    ticks = 4 * (sizes["clocks"] + 3 + walks + media) * timed
-    return float(sizes["path"] + queues + beside + times + ticks + 8 * stride + 4)
 
 
 def _told_images(sizes: list[int]) -> list[str]:
@@ -213,7 +79,9 @@ class HostScene:
         """Builds structures and lights. False when cancelled."""
         if not self.core.prepare():
             return False
-        self.facts, self.images = self.core.device_facts(), self.core.device_images()
+        self.facts = self.core.device_facts()
+        (blocks, links), trees, left, depth = self.core.device_images()
+        self.images = (tiled(blocks, links), links), trees, left, depth
         return True
 
     def build_all(self) -> bool:
@@ -315,7 +183,9 @@ class DeviceRenderer(HostFilm):
         self._media = facts["media"] and bool(self._stages.plan["VOLUMES"])
         film = self._scene.film
         x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
-        self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]), facts["moves"])
+        self._transparent = bool(facts["transparent"])
+        beside = Beside(self._walks is not None, self._media, facts["moves"], self._timed, self._transparent)
+        self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]), beside)
         return not self._cancelled
 
     def _upload(self) -> tuple[dict[str, Any], Blocks]:
@@ -341,22 +211,20 @@ class DeviceRenderer(HostFilm):
         budget = self._scene.settings.texture_memory
         return images_to_leave(blocks, min(room, int(budget * 1e6)) if budget > 0 else room)
 
-    def _allocate(self, pixels: int, materials: int, moves: bool) -> Memory:
+    def _allocate(self, pixels: int, materials: int, beside: Beside) -> Memory:
         """As large a wavefront as the device's memory allows, up to MOST_PATHS."""
         cp = cupy()
         free, _ = cp.cuda.runtime.memGetInfo()
         fields, root = core.render.task_fields(), self._arrays.root
         stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
-        walks, media = self._walks is not None, self._media
-        fits = int(
-            (free * MEMORY_SHARE - pixels * (8 * stride + 4))
-            / bytes_per_path(stride, pixels, walks, media, moves, self._timed)
-        )
+        fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, beside))
         samples = max(1, self._scene.settings.samples)
-        paths = min(MOST_PATHS, fits, pixels * samples)
+        processors = int(cp.cuda.Device().attributes["MultiProcessorCount"])
+        fills = 1 << max(20, (processors * PATHS_OF_MULTIPROCESSOR).bit_length() - 1)
+        paths = min(MOST_PATHS, fills, fits, pixels * samples)
         while paths >= min(FEWEST_PATHS, pixels):
             try:
-                return Memory(root, pixels, materials, paths, walks, media, moves)
+                return Memory(root, pixels, materials, paths, beside)
             except cp.cuda.memory.OutOfMemoryError:
                 cp.get_default_memory_pool().free_all_blocks()
                 paths //= 2
@@ -482,8 +350,10 @@ class DeviceRenderer(HostFilm):
                                  memory.address("blocked"), memory.counter("shadows"), memory.counter("shadowed"),
                                  memory.address("shadow_time"), memory.address("shadow_ticks"))  # fmt: skip
             with self._clock("shadows"):
-                self._launch(self._stages.kernel("add_shadows"), turn, shadows, self._tracer.root)
-            memory.clear("shadows", "shadowed")
+                self._launch(self._stages.kernel("add_shadows"), turn, shadows)
+                if self._transparent:
+                    self._launch(self._stages.kernel("see_through"), turn, shadows, self._tracer.root)
+            memory.clear("shadows", "shadowed", "see_through")
         return shadows
 
     def _clock(self, stage: str) -> AbstractContextManager[None]:
@@ -522,7 +392,9 @@ class DeviceRenderer(HostFilm):
     def _shading_kernel(self) -> dict[str, float]:
         """What the dearest stage takes of a multiprocessor."""
         told = self._stages.kernel("shade_surfaces").properties(BLOCK)
-        return {name: told[name] for name in ("registers", "local_bytes", "occupancy")}
+        return {name: told[name] for name in ("registers", "local_bytes", "occupancy")} | {
+            "code_bytes": self._stages.code_bytes
+        }
 
     def own_stats(self) -> dict[str, Any]:
         """Those of them that are the device's; none before prepare()."""

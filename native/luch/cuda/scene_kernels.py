@@ -76,6 +76,7 @@ class SceneKernels:
             self._module, self._ready, self.general = self._loaded(self._ready), None, False
 
     def _loaded(self, image: bytes) -> Module:
+        self.code_bytes = len(image)  # of all stages, tables of constants included
         return compiler.scene_module(image, int(cupy().cuda.Device().id))
 
     def kernel(self, name: str) -> Kernel:

@@ -38,7 +38,7 @@ class StageClocks:
     def charge(self, memory: Any, those: Any, pixels: int, samples: int, seconds: float) -> None:
         """Adds a wave's seconds to its pixels in the film. The device must have ended it.
 
-        memory: luch.cuda.render.Memory; those: which pixels of the film, a slice or a list; so many samples of each.
+        memory: luch.cuda.memory.Memory; those: which pixels of the film, a slice or a list; so many samples of each.
         """
         cp = cupy()
         spent = dict.fromkeys(CLOCKS, 0.0)

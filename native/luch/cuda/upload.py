@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from luch._native import core
 from luch.cuda.device import DeviceError, cupy
 
 Blocks = list[tuple[str, Any]]  # name, (bytes,) uint8
@@ -78,6 +79,36 @@ def too_large(needed: int) -> DeviceError:
         f"The scene takes {needed / 2**30:.1f} GiB of the GPU's memory, of which {free / 2**30:.1f} are free. Close "
         "what else uses the GPU, simplify meshes, or use the CPU."
     )
+
+
+def tiled(blocks: Blocks, links: Links) -> Blocks:
+    """The blocks with every image's texels put together by tiles, so that neighbours in both directions lie near each
+    other: wherever they are read from, a GPU reads 32 bytes or more at a time. Images smaller than a tile stay.
+    """
+    layout, result = core.render.image_layout(), list(blocks)
+    size, tile = layout["size"], layout["tile"]
+    views: dict[int, bytearray] = {}
+    for block, offset, target, _ in links:
+        if result[target][0] != PIXELS or offset % size != layout["pixels"]:
+            continue
+        view = views.setdefault(block, bytearray(blocks[block][1]))
+        at = offset - layout["pixels"]
+        width, height = (struct.unpack_from("<I", view, at + layout[name])[0] for name in ("width", "height"))
+        if min(width, height) >= tile:
+            result[target] = (PIXELS, in_tiles(blocks[target][1], width, height, tile))
+            struct.pack_into("<I", view, at + layout["tiles_across"], -(-width // tile))
+    for number, view in views.items():
+        result[number] = (blocks[number][0], np.frombuffer(view, np.uint8))
+    return result
+
+
+def in_tiles(texels: Any, width: int, height: int, tile: int) -> Any:
+    """texels: (bytes,) row by row. Returns (bytes,) tile by tile; tiles beyond the edge are filled up with zeros."""
+    rows = np.asarray(texels).reshape(height, width, -1)
+    across, down = -(-width // tile), -(-height // tile)
+    whole = np.zeros((down * tile, across * tile, rows.shape[2]), np.uint8)
+    whole[:height, :width] = rows
+    return whole.reshape(down, tile, across, tile, -1).swapaxes(1, 2).reshape(-1)
 
 
 def images_to_leave(blocks: Blocks, room: int) -> set[int]:

@@ -15,6 +15,7 @@ enum WaveCounter : u32 {
     WAVE_SHADOWED,     // and of the shadow kernel
     WAVE_WALKS,        // under surfaces, of this round
     WAVE_WALKED,       // work counter of their kernel
+    WAVE_SEE_THROUGH,  // shadow rays that met what may let light through
     WAVE_COUNTERS
 };
 
@@ -75,6 +76,7 @@ struct Wavefront {
     ShadowRay* shadows;
     u32* shadow_kind;          // RAY_SHADOW, all of them
     u8* blocked;
+    u32* see_through;          // which shadow rays; null: nothing lets light through
     SubsurfaceWalk* walks;     // that begin in this round; null: nothing scatters under its surface
     MediumStack* media;        // by slot: around its ray; null: the scene has none
     MediumStack* shadow_media; // by shadow ray: around its beginning

@@ -74,13 +74,16 @@ struct MaterialView {
 
 enum class PixelFormat : u8 { U8, F16, F32 };
 
+inline constexpr u32 IMAGE_TILE = 8;  // texels along a side of those that lie together on a GPU
+
 struct ImageView {
-    const void* pixels;  // rows bottom first
+    const void* pixels;  // rows bottom first; of tiles, if tiles_across is not 0
     u32 width, height;
     u8 channels;         // 1..4
     PixelFormat format;
     u8 srgb;             // decode on lookup
     u8 alpha;            // 0 straight, 1 premultiplied, 2 channel packed, 3 none
+    u32 tiles_across;    // 0: the texels lie row by row; else by tiles of IMAGE_TILE x IMAGE_TILE, each row by row
 };
 
 struct LightsView;  // light/light.h

@@ -29,10 +29,17 @@ LUCH_FN float read_channel(const u8* p) { return float(*p) * (1.0f / 255.0f); }
 LUCH_FN float read_channel(const u16* p) { return half_to_float(*p); }
 LUCH_FN float read_channel(const float* p) { return *p; }
 
+// Which texel in memory: 0 <= x < width, 0 <= y < height.
+LUCH_FN u64 texel_index(const ImageView& image, u32 x, u32 y) {
+    if (image.tiles_across == 0) return u64(y) * image.width + x;
+    u64 tile = u64(y / IMAGE_TILE) * image.tiles_across + x / IMAGE_TILE;
+    return (tile * IMAGE_TILE + y % IMAGE_TILE) * IMAGE_TILE + x % IMAGE_TILE;
+}
+
 // 0 <= x < width, 0 <= y < height. Straight alpha of colours is multiplied in; data stays as it is.
 template <class Stored>
 LUCH_FN Texel read_texel(const ImageView& image, int x, int y) {
-    const Stored* p = static_cast<const Stored*>(image.pixels) + (u64(y) * image.width + u64(x)) * image.channels;
+    const Stored* p = static_cast<const Stored*>(image.pixels) + texel_index(image, u32(x), u32(y)) * image.channels;
     Texel t;
     t.r = read_channel(p);
     t.g = image.channels >= 3 ? read_channel(p + 1) : t.r;

@@ -1,0 +1,168 @@
+"""The film and the wavefront on a device: how large they are, and where in them what lies."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from luch._native import core
+from luch.cuda.device import cupy
+
+NONE = 0xFFFFFFFF  # of luch/platform.h: not there
+MARK_CHANNELS = 4  # of luch/film/film.h
+RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
+COUNTERS = (
+    "rays",
+    "next_rays",
+    "shadows",
+    "hits",
+    "traced",
+    "shadowed",
+    "walks",
+    "walked",
+    "see_through",
+)  # WaveCounter
+
+
+class Beside(NamedTuple):
+    """What paths have beside what all of them have."""
+
+    walks: bool = False  # they may go under surfaces
+    media: bool = False  # and through volumes
+    moves: bool = False  # each has a time of its own
+    timed: bool = False  # and is timed
+    transparent: bool = False  # its shadow rays may see through surfaces
+
+
+class Memory:
+    """The film and the wavefront on the device, and their places in the RenderTask."""
+
+    def __init__(self, task: bytes, pixels: int, materials: int, paths: int, beside: Beside) -> None:
+        """paths: so many at once, or a few less."""
+        cp, fields, sizes = cupy(), core.render.task_fields(), core.render.task_sizes()
+        self._fields, self._task = fields, bytearray(task)
+        stride = self.field("film.layout.stride", "<I")
+        aovs = self.field("film.layout.aov_count", "<I")
+        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE) + beside.walks + beside.media
+        self.layer_pixels = min(pixels, paths)
+        self.layers = max(1, paths // pixels)
+        slots = self.slots = self.layer_pixels * self.layers
+        self.pixels, self.stride = pixels, stride
+
+        def empty(count: int, kind: Any = np.uint8) -> Any:
+            return cp.empty(count, kind)
+
+        self.rows = cp.zeros((self.layers, pixels, stride), np.float64)
+        self.counts = cp.zeros((self.layers, pixels), np.uint32)
+        self.counters, self.totals = cp.zeros(sizes["counters"], np.uint32), cp.zeros(sizes["totals"], np.uint64)
+        self.arrays = {
+            "paths": empty(slots * sizes["path"]),
+            "rays": empty(slots * sizes["ray"]),
+            "ray_slot": empty(slots, np.uint32),
+            "ray_kind": empty(slots, np.uint32),
+            "next_rays": empty(slots * sizes["ray"]),
+            "next_slot": empty(slots, np.uint32),
+            "next_kind": empty(slots, np.uint32),
+            "hits": empty(slots * sizes["hit"]),
+            "sorted": empty(slots, np.uint32),
+            "material_first": cp.zeros(materials, np.uint32),
+            "shadow_rays": empty(slots * shadows * sizes["ray"]),
+            "shadows": empty(slots * shadows * sizes["shadow"]),
+            "shadow_kind": cp.full(slots * shadows, RAY_SHADOW, np.uint32),
+            "blocked": empty(slots * shadows),
+            "counters": self.counters,
+            "totals": self.totals,
+        }
+        if beside.walks:
+            self.arrays["walks"] = empty(slots * sizes["walk"])
+        if beside.moves:
+            self.arrays |= {
+                "ray_time": empty(slots, np.float32),
+                "next_time": empty(slots, np.float32),
+                "shadow_time": empty(slots * shadows, np.float32),
+            }
+        if beside.timed:
+            self.arrays |= {
+                "ticks": cp.zeros((sizes["clocks"], slots), np.uint32),
+                "ray_ticks": empty(slots, np.uint32),
+                "shadow_ticks": empty(slots * shadows, np.uint32),
+            }
+        if beside.transparent:
+            self.arrays["see_through"] = empty(slots * shadows, np.uint32)
+        if aovs:
+            self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
+        if beside.media:
+            self.arrays["media"] = empty(slots * sizes["media"])
+            self.arrays["shadow_media"] = empty(slots * shadows * sizes["media"])
+        self._set("film.rows", "<Q", self.rows.data.ptr)
+        self._set("film.sample_counts", "<Q", self.counts.data.ptr)
+        self._set("wave.slots", "<I", slots)
+        self._set("wave.layer_pixels", "<I", self.layer_pixels)
+        self._set("wave.layer_stride", "<Q", pixels * stride)
+        self._set("wave.film_pixels", "<I", pixels)
+        for name, array in self.arrays.items():
+            self._set(f"wave.{name}", "<Q", array.data.ptr)
+        self.tasks = [bytes(self._task), b""]
+        for name in ("rays", "slot", "kind", *(("time",) if beside.moves else ())):
+            own, following = ("rays", "next_rays") if name == "rays" else (f"ray_{name}", f"next_{name}")
+            self._set(f"wave.{own}", "<Q", self.arrays[following].data.ptr)
+            self._set(f"wave.{following}", "<Q", self.arrays[own].data.ptr)
+        self.tasks[1] = bytes(self._task)
+
+    def field(self, name: str, kind: str) -> int:
+        """A number of the task."""
+        value: int = struct.unpack_from(kind, self._task, self._fields[name])[0]
+        return value
+
+    def _set(self, name: str, kind: str, value: int) -> None:
+        struct.pack_into(kind, self._task, self._fields[name], value)
+
+    def address(self, name: str) -> int:
+        """Of an array on the device; 0 if this scene needs no such array."""
+        return int(self.arrays[name].data.ptr) if name in self.arrays else 0
+
+    def counter(self, name: str) -> int:
+        """Address of one of WaveCounter."""
+        return int(self.counters.data.ptr) + 4 * COUNTERS.index(name)
+
+    def clear(self, *names: str) -> None:
+        """Sets some of WaveCounter to 0, on the device."""
+        for index in map(COUNTERS.index, names):
+            self.counters[index : index + 1].fill(0)
+
+    def count(self, name: str) -> int:
+        """Of one of WaveCounter; waits for the device."""
+        index = COUNTERS.index(name)
+        return int(self.counters[index : index + 1].get()[0])
+
+    def mark(self, sample: int, pixels: Any = None) -> None:
+        """As film_mark of luch/film/film.h, of every layer and pixel (or of those in a list on the device).
+
+        To be called before that sample.
+        """
+        marks = self.field("film.layout.marks", "<I")
+        if marks == NONE or sample == 0 or sample & (sample - 1):
+            return
+        channel = marks + (0 if sample & 0x55555555 else MARK_CHANNELS)
+        those = slice(None) if pixels is None else pixels
+        self.rows[:, those, channel : channel + 3] = self.rows[:, those, :3]  # Combined comes first
+        self.rows[:, those, channel + 3] = self.counts[:, those]
+
+    @property
+    def bytes(self) -> int:
+        """All of it."""
+        return int(self.rows.nbytes + self.counts.nbytes + sum(array.nbytes for array in self.arrays.values()))
+
+
+def bytes_per_path(stride: int, beside: Beside) -> float:
+    """Device memory of one path under way: its state, its queues, and its part of a layer of the film."""
+    sizes = core.render.task_sizes()
+    walks, media, moves, timed, transparent = beside
+    shadow = sizes["ray"] + sizes["shadow"] + 5 + media * sizes["media"] + 4 * transparent
+    queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + (2 + walks + media) * shadow
+    rest = walks * sizes["walk"] + media * sizes["media"]
+    times = 4 * (4 + walks + media) * moves
+    ticks = 4 * (sizes["clocks"] + 3 + walks + media) * timed
+    return float(sizes["path"] + queues + rest + times + ticks + 8 * stride + 4)
