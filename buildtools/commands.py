@@ -113,14 +113,14 @@ def fuzz(arguments: Arguments) -> int:
 
 def bench(arguments: Arguments) -> int:
     folder = ROOT / "tests" / "bench"
-    names = sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
+    names = sorted(path.stem.replace("_", "-") for path in folder.glob("*.py") if not path.stem.startswith("_"))
     if arguments.name is None:
         print("benches:", ", ".join(names))
         return 0
-    if arguments.name not in names:
+    if arguments.name.replace("_", "-") not in names:
         raise BuildFailure(f"no bench named {arguments.name}; there are: {', '.join(names)}")
     _prepare(arguments)
-    return status([str(VENV_PYTHON), str(folder / f"{arguments.name}.py"), *arguments.rest])
+    return status([str(VENV_PYTHON), str(folder / f"{arguments.name.replace('-', '_')}.py"), *arguments.rest])
 
 
 def check(arguments: Arguments) -> int:

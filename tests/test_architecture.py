@@ -165,3 +165,16 @@ def test_cpu_sources_include_no_python_and_bindings_only_pybind11() -> None:
         if path.is_relative_to(ROOT / "native" / "cpu"):
             offenders = [i for i in includes(path) if i.startswith(("pybind11", "Python", "bindings/", "cuda/"))]
             assert not offenders, f"{path.relative_to(ROOT)} includes {offenders}"
+
+
+# Functions whose coefficients are the function; where a walk gives up, which is a limit of the method.
+NO_TOLERANCES = {"math/fn.h", "math/bounds.h", "integrator/subsurface.h"}
+TOLERANCE = re.compile(r"constexpr (?:float|double) [A-Z_0-9]+ ?= ?-?[0-9.]+e-\d+")
+
+
+def test_every_named_tolerance_stands_in_one_header() -> None:
+    """docs/numerics.md; what a header needs of them, it takes from math/bounds.h."""
+    stray = [f"{path.relative_to(INCLUDE / 'luch')}: {found}" for path in (INCLUDE / "luch").rglob("*.h")
+             if path.relative_to(INCLUDE / "luch").as_posix() not in NO_TOLERANCES
+             for found in TOLERANCE.findall(path.read_text(encoding="utf-8"))]  # fmt: skip
+    assert not stray, "move it to luch/math/bounds.h, with its reason"

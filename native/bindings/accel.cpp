@@ -12,8 +12,6 @@ namespace {
 
 using cpu::Accel;
 
-constexpr Affine IDENTITY = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-
 // Meshes and instances as arrays, and rays through them. Shapes are checked in Python (luch/accel.py).
 class ArrayAccel {
  public:
@@ -65,6 +63,7 @@ class ArrayAccel {
         out["leaf_blocks"] = s.leaf_blocks;
         out["bytes"] = s.bytes;
         out["dropped_triangles"] = s.dropped_triangles;
+        out["duplicate_primitives"] = s.duplicates;
         out["dropped_spheres"] = s.dropped_spheres;
         out["build_seconds"] = s.build_seconds;
         return out;
@@ -83,7 +82,7 @@ FloatArray spawn_rays(const FloatArray& corners, const FloatArray& uv, const Flo
     for (py::ssize_t i = 0; i < count; ++i) {
         const Vec3* p = reinterpret_cast<const Vec3*>(corners.data() + 9 * i);
         Vec3 d = *reinterpret_cast<const Vec3*>(directions.data() + 3 * i);
-        SurfacePoint s = triangle_point(p[0], p[1], p[2], uv.data()[2 * i], uv.data()[2 * i + 1], IDENTITY, IDENTITY);
+        TrianglePoint s = traced_point({{p[0], p[1], p[2]}}, uv.data()[2 * i], uv.data()[2 * i + 1]);
         Vec3 n = normalize_or(cross(p[1] - p[0], p[2] - p[0]), make_vec3(0.0f, 0.0f, 1.0f));
         out[i] = {offset_origin(s.p, s.error, n, d), 0.0f, d, INFINITE_DISTANCE};
     }

@@ -15,7 +15,8 @@ using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 // not finite. channels 1: a value, 3: a colour, 4: a colour and transparency (Combined).
 u64 add_samples(cpu::Film& film, u32 pixel, u32 channel, const Floats& values) {
     if (values.ndim() != 2) throw py::value_error("values must have shape (N, channels)");
-    FilmWriter writer{film.view(), 0};
+    u64 refused[REFUSALS] = {};
+    FilmWriter writer{film.view(), refused};
     py::ssize_t channels = values.shape(1);
     for (py::ssize_t i = 0; i < values.shape(0); ++i) {
         const float* v = values.data(i, 0);
@@ -23,7 +24,7 @@ u64 add_samples(cpu::Film& film, u32 pixel, u32 channel, const Floats& values) {
         if (channels >= 3) film_add(writer, pixel, channel, Color{v[0], v[1], v[2]});
         if (channels == 4) film_add(writer, pixel, channel + 3, v[3]);
     }
-    return writer.rejected;
+    return refused[REFUSED_DATA];
 }
 
 }  // namespace
@@ -135,30 +136,30 @@ void bind_film(py::module_& m) {
         .def("add_samples", &add_samples, py::arg("pixel"), py::arg("channel"), py::arg("values"))
         .def("add_crypto",
              [](cpu::Film& self, u32 pixel, u32 channel, float id, float weight) {
-                 FilmWriter writer{self.view(), 0};
+                 FilmWriter writer{self.view(), nullptr};
                  film_add_crypto(writer, pixel, channel, id, weight);
              })
         .def("set_first",
              [](cpu::Film& self, u32 pixel, float depth, const std::array<float, 3>& position) {
-                 FilmWriter writer{self.view(), 0};
+                 FilmWriter writer{self.view(), nullptr};
                  film_set(writer, pixel, writer.film.layout.depth, depth);
                  film_set_position(writer, pixel, {position[0], position[1], position[2]});
              })
         .def("set_background",
              [](cpu::Film& self, u32 pixel) {
-                 FilmWriter writer{self.view(), 0};
+                 FilmWriter writer{self.view(), nullptr};
                  film_set_background(writer, pixel);
              })
         .def(
             "count_samples",
             [](cpu::Film& self, u32 pixel, u32 samples) {
-                FilmWriter writer{self.view(), 0};
+                FilmWriter writer{self.view(), nullptr};
                 film_count_samples(writer, pixel, samples);
             },
             py::arg("pixel"), py::arg("samples"))
         .def("mark",
              [](cpu::Film& self, u32 pixel, u32 sample) {
-                 FilmWriter writer{self.view(), 0};
+                 FilmWriter writer{self.view(), nullptr};
                  film_mark(writer, pixel, sample);
              })
         .def("marks", [](cpu::Film& self) { return self.view().layout.marks; })

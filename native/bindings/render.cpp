@@ -17,6 +17,10 @@
 namespace luch::bindings {
 namespace {
 
+// As Refusal has them; luch/cuda/render.py reads the device's under the same names.
+constexpr const char* REFUSAL_NAMES[REFUSALS] = {"refused_emission", "refused_direct", "refused_scatter",
+                                                 "refused_flight", "refused_data"};
+
 class PyRenderer {
  public:
     PyRenderer(const py::object& scene, bool for_device, std::optional<u64> device_builds_from) {
@@ -24,6 +28,7 @@ class PyRenderer {
         read.input.for_device = for_device;
         if (device_builds_from) read.input.device_builds_from = *device_builds_from;
         dropped_instances_ = read.dropped_instances;
+        image_warnings_ = read.warnings;
         renderer_ = std::make_unique<cpu::Renderer>(std::move(read.store), read.input);
     }
 
@@ -114,7 +119,12 @@ class PyRenderer {
         d["rays"] = s.counts.rays;
         d["shadow_rays"] = s.counts.shadow_rays;
         d["surface_points"] = s.counts.surface_points;
-        d["non_finite_samples"] = s.counts.bad_samples;
+        u64 refused = 0;
+        for (u32 cause = 0; cause < REFUSALS; cause++) {
+            d[REFUSAL_NAMES[cause]] = s.counts.refused[cause];
+            refused += s.counts.refused[cause];
+        }
+        d["non_finite_samples"] = refused;
         d["clamped_units"] = s.counts.clamped;
         d["cut_units"] = s.counts.cut;
         d["accelerator"] = s.accel_name;
@@ -125,9 +135,16 @@ class PyRenderer {
         d["structure_nodes"] = s.accel.nodes;
         d["structure_bytes"] = s.accel.bytes;
         d["dropped_triangles"] = s.accel.dropped_triangles;
+        d["duplicate_primitives"] = s.accel.duplicates;
+        py::list left_out;
+        for (const cpu::LeftOut& row : s.accel.left_out)
+            left_out.append(py::make_tuple(row.mesh, row.invalid, row.too_far, row.empty, row.copies));
+        d["left_out"] = left_out;
         d["dropped_spheres"] = s.accel.dropped_spheres;
         d["dropped_curve_pieces"] = s.accel.dropped_pieces;
-        d["dropped_instances"] = dropped_instances_;
+        d["dropped_instances"] = dropped_instances_.size();
+        d["dropped_objects"] = dropped_instances_;
+        d["image_warnings"] = image_warnings_;
         d["structure_seconds"] = s.accel_seconds;
         d["lights_seconds"] = s.lights_seconds;
         d["trace_seconds"] = s.trace_seconds;
@@ -148,7 +165,8 @@ class PyRenderer {
 
  private:
     std::unique_ptr<cpu::Renderer> renderer_;
-    u64 dropped_instances_ = 0;
+    std::vector<u32> dropped_instances_;
+    std::vector<std::string> image_warnings_;
 };
 
 // Where luch/cuda/render.py finds the fields that it sets in a RenderTask, by name; and the sizes of what it allocates.

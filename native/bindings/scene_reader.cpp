@@ -78,7 +78,7 @@ struct Reader {
     py::object scene;
     cpu::SceneStore& store;
     cpu::RenderInput& input;
-    std::vector<std::string> lightgroups, aovs;
+    std::vector<std::string> lightgroups, aovs, warnings{};
 
     Program read_program(const py::object& program, const std::string& owner) {
         cpu::ProgramSource source;
@@ -290,8 +290,8 @@ struct Reader {
         return out;
     }
 
-    u64 read_instances(const py::object& instances) {
-        if (instances.is_none()) return 0;
+    std::vector<u32> read_instances(const py::object& instances) {
+        if (instances.is_none()) return {};
         auto object = py::cast<Array<u32>>(instances.attr("object"));
         auto matrix = py::cast<Array<double>>(instances.attr("matrix"));
         auto random = py::cast<Array<float>>(instances.attr("random"));
@@ -302,7 +302,7 @@ struct Reader {
             size_t(generated.size()) != count * 3 || size_t(uv.size()) != count * 2) {
             throw std::invalid_argument("Instances: the arrays differ in length.");
         }
-        u64 dropped = 0;
+        std::vector<u32> dropped;
         std::vector<std::vector<cpu::Matrix>> motion = read_instance_motion(instances.attr("motion"), count);
         for (size_t i = 0; i < count; i++) {
             cpu::InstanceInput in{};
@@ -313,9 +313,30 @@ struct Reader {
             in.generated = {generated.data()[i * 3], generated.data()[i * 3 + 1], generated.data()[i * 3 + 2]};
             in.uv = {uv.data()[i * 2], uv.data()[i * 2 + 1]};
             if (!motion.empty()) in.motion = std::move(motion[i]);
-            if (!store.add_instance(in)) dropped++;
+            if (!store.add_instance(in)) dropped.push_back(in.object);
         }
         return dropped;
+    }
+
+    // One texel that is not finite would spread to all that is interpolated with it and to every table that sums over it.
+    void blacken_broken_texels(const std::string& name, const ImageView& view, std::vector<u8>& bytes) {
+        size_t texels = size_t(view.width) * view.height, broken = 0;
+        auto scan = [&](auto* values, auto exponent) {
+            for (size_t t = 0; t < texels; t++, values += view.channels) {
+                bool finite = true;
+                for (u32 k = 0; k < view.channels; k++) finite = finite && (values[k] & exponent) != exponent;
+                if (finite) continue;
+                std::fill(values, values + view.channels, decltype(exponent)(0));
+                broken++;
+            }
+        };
+        if (view.format == PixelFormat::F32)
+            scan(reinterpret_cast<u32*>(bytes.data()), u32(0x7f800000));
+        else
+            scan(reinterpret_cast<u16*>(bytes.data()), u16(0x7c00));
+        if (broken > 0)
+            warnings.push_back("Image \"" + name + "\": " + std::to_string(broken) +
+                               " pixels are not finite and show black. Save it anew without them.");
     }
 
     void read_image(const py::object& image) {
@@ -344,6 +365,7 @@ struct Reader {
         view.alpha = alpha == "PREMULTIPLIED" ? 1 : alpha == "CHANNEL_PACKED" ? 2 : alpha == "NONE" ? 3 : 0;
         std::vector<u8> bytes(size_t(pixels.nbytes()));
         std::memcpy(bytes.data(), pixels.data(), bytes.size());
+        if (view.format != PixelFormat::U8) blacken_broken_texels(name, view, bytes);
         store.add_image(view, std::move(bytes));
     }
 
@@ -594,6 +616,7 @@ ReadScene read_scene(const py::object& scene) {
     named("Settings", [&] { reader.read_settings(scene.attr("settings")); });
     named("Camera", [&] { reader.read_camera(scene.attr("camera"), film); });
     named("Shutter", [&] { reader.read_shutter(scene.attr("shutter")); });
+    out.warnings = std::move(reader.warnings);
     return out;
 }
 

@@ -10,7 +10,8 @@ namespace luch::bindings {
 struct ReadScene {
     std::unique_ptr<cpu::SceneStore> store;
     cpu::RenderInput input;
-    u64 dropped_instances = 0;  // matrix not finite or without an inverse
+    std::vector<u32> dropped_instances;  // their objects: a matrix that is not finite, or leaves only a line or a point
+    std::vector<std::string> warnings;  // of images
 };
 
 // Throws std::invalid_argument for data that does not fit together.

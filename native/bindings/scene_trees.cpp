@@ -34,6 +34,7 @@ class ArraySceneTrees {
         out["triangles"] = s.triangles;
         out["nodes"] = s.nodes;
         out["bytes"] = s.bytes;
+        out["duplicate_primitives"] = s.duplicates;
         out["dropped_triangles"] = s.dropped_triangles;
         out["groups"] = s.groups;
         out["entries"] = s.entries;

@@ -4,11 +4,13 @@
 #include <pybind11/numpy.h>
 
 #include <algorithm>
+#include <cstring>
 #include <mutex>
 #include <vector>
 
 #include "bindings/bind.h"
 #include "bindings/counts.h"
+#include "cpu/accel/copies.h"
 
 namespace luch::bindings {
 namespace {
@@ -40,6 +42,7 @@ class ArrayStructure {
             if (sphere_can_be_traced({vec3_of(s + 4 * size_t(k)), s[4 * size_t(k) + 3]}))
                 refs_.push_back(triangle_count + k);
         dropped_ = triangle_count + sphere_count - refs_.size();
+        leave_out_copies_of_each(triangle_count);
         Primitives all = {corners_.data(), spheres_.data(), flags_.empty() ? nullptr : flags_.data(),
                           triangle_count,  sphere_count,    {}};
         structure_ = cpu::build_structure(cpu::StructureKind(kind),
@@ -98,6 +101,7 @@ class ArrayStructure {
         py::dict out;
         out["primitives"] = refs_.size();
         out["dropped"] = dropped_;
+        out["duplicate_primitives"] = copies_;
         out["nodes"] = s.nodes;
         out["references"] = s.references;
         out["depth"] = s.depth;
@@ -117,6 +121,31 @@ class ArrayStructure {
     }
 
  private:
+    void leave_out_copies_of_each(u32 triangle_count) {
+        auto numbers = [&](u32 ref, u32* count) {
+            *count = ref < triangle_count ? 9 : 4;
+            return ref < triangle_count ? corners_.data() + 9 * size_t(ref)
+                                        : spheres_.data() + 4 * size_t(ref - triangle_count);
+        };
+        auto hash = [&](u32 ref) {
+            u32 count;
+            const float* own = numbers(ref, &count);
+            return cpu::hash_of_floats(own, count);
+        };
+        auto same = [&](u32 a, u32 b) {
+            u32 of_a, of_b;
+            const float *x = numbers(a, &of_a), *y = numbers(b, &of_b);
+            return of_a == of_b && std::memcmp(x, y, of_a * sizeof(float)) == 0 &&
+                   (flags_.empty() || flags_[a] == flags_[b]);
+        };
+        cpu::CopySearch search;
+        size_t all = refs_.size();
+        std::erase_if(refs_, [&](u32 ref) { return search.seen(hash(ref), ref, same); });
+        if (all - refs_.size() > refs_.size())
+            refs_.resize(cpu::leave_out_copies(refs_.data(), refs_.size(), hash, same, [](u32) {}));
+        copies_ = all - refs_.size();
+    }
+
     static bool gather(const float* positions, u32 vertex_count, const u32* index, float* corners) {
         for (int k = 0; k < 3; ++k) {
             if (index[k] >= vertex_count) return false;
@@ -152,7 +181,7 @@ class ArrayStructure {
     std::vector<float> corners_, spheres_;
     std::vector<u8> flags_;
     std::vector<u32> refs_;
-    u64 dropped_ = 0;
+    u64 dropped_ = 0, copies_ = 0;
     std::unique_ptr<cpu::Structure> structure_;
 };
 

@@ -330,7 +330,7 @@ void Film::merge(const Film& other) {
     if (other.counts_.size() != counts_.size() || other.layout_.stride != layout_.stride ||
         other.passes_.size() != passes_.size())
         throw std::invalid_argument("Film: only films of the same size and passes merge.");
-    FilmWriter writer{view(), 0};
+    FilmWriter writer{view(), nullptr};
     FilmView from = view();
     from.rows = other.rows_.get();
     from.sample_counts = const_cast<u32*>(other.counts_.data());  // only read

@@ -102,9 +102,6 @@ std::array<double, 3> longest_cross(const double* m, int next, int step) {
     return best;
 }
 
-// A matrix that flattens (a scale of 0) has no inverse: it is given this thickness, as a share of its size.
-constexpr double FLAT_THICKNESS = 1e-5;
-
 // Adds a scale along the one direction that the matrix loses, to the normal of the plane that it leaves.
 void thicken(double* m) {
     double size = 0.0;
@@ -112,7 +109,19 @@ void thicken(double* m) {
     std::array<double, 3> lost = longest_cross(m, 1, 4), normal = longest_cross(m, 4, 1);
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++)
-            m[row * 4 + column] += FLAT_THICKNESS * size * normal[row] * lost[column];
+            m[row * 4 + column] += double(FLAT_THICKNESS) * size * normal[row] * lost[column];
+}
+
+// instances.h: C.
+double condition(const double* m, const double* inverse) {
+    double largest[2] = {};
+    for (int row = 0; row < 3; row++) {
+        for (int k = 0; k < 2; k++) {
+            const double* r = (k == 0 ? m : inverse) + row * 4;
+            largest[k] = std::max(largest[k], std::abs(r[0]) + std::abs(r[1]) + std::abs(r[2]));
+        }
+    }
+    return largest[0] * largest[1];
 }
 
 Affine to_affine(const double* m) {
@@ -199,7 +208,7 @@ u32 SceneStore::add_object(const ObjectInput& input) {
 bool SceneStore::add_instance(const InstanceInput& input) {
     double inverse[12] = {}, m[12];
     std::copy(input.matrix, input.matrix + 12, m);
-    if (!invert_affine(m, inverse)) {
+    if (!invert_affine(m, inverse) || condition(m, inverse) > double(INSTANCE_CONDITION_FLAT)) {
         thicken(m);
         if (!invert_affine(m, inverse)) return false;
     }
@@ -277,6 +286,11 @@ const SceneView& SceneStore::finish() {
     view_.material_count = u32(materials_.size());
     view_.image_count = u32(images_.size());
     return view_;
+}
+
+void SceneStore::mark_in_world(const std::vector<u8>& in_world) {
+    for (size_t i = 0; i < instances_.size(); i++)
+        if (in_world[i]) instances_[i].flags |= INSTANCE_IN_WORLD;
 }
 
 std::vector<std::vector<u8>> SceneStore::transparency_flags(bool all) const {

@@ -80,6 +80,9 @@ class SceneStore {
     void add_image(const ImageView& image, std::vector<u8> pixels);
     void set_world_program(const Program& program) { view_.world_program = program; }
 
+    // After finish(): the instances, by number, get INSTANCE_IN_WORLD.
+    void mark_in_world(const std::vector<u8>& in_world);
+
     // Points the view at the arrays; call after the last add_.
     const SceneView& finish();
     SceneView& view() { return view_; }

@@ -18,6 +18,14 @@ from luch.scene import F32
 
 # CLAMPED_UNIT and CUT_UNIT of luch/film/film.h.
 CLAMPED_UNIT, CUT_UNIT = 2.0**-16, 2.0**-20
+# Refusal of luch/film/film.h: where samples came to light that are not finite, and in words.
+REFUSALS = {
+    "refused_emission": "light that was met",
+    "refused_direct": "light that was sampled",
+    "refused_scatter": "surfaces",
+    "refused_flight": "volumes",
+    "refused_data": "passes",
+}
 # Below a ten thousandth nothing is said.
 LEAST_SHARE = 1e-4
 
@@ -44,5 +52,6 @@ def lines(stats: Mapping[str, Any]) -> list[str]:
     if stats.get("cut_share_estimate", 0.0) > LEAST_SHARE:
         told.append(f"Limits of bounces took about {percent(stats['cut_share_estimate'])} % of the light")
     if stats.get("refused_share", 0.0) > 0.0:
-        told.append(f"{percent(stats['refused_share'])} % of the samples were not finite and were refused")
+        causes = ", ".join(f"{words} {stats[key]}" for key, words in REFUSALS.items() if stats.get(key))
+        told.append(f"{percent(stats['refused_share'])} % of the samples were not finite and were refused ({causes})")
     return told

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from luch import accuracy, denoise, ledger, memory, pixel_error
+from luch import accuracy, denoise, door, ledger, memory, pixel_error
 from luch._native import core
 from luch.adaptive import Adaptive
 from luch.check import check_scene
@@ -317,7 +317,14 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
         peak_memory_bytes=peak_memory_bytes(),
         cancelled=loop.cancelled,
         stopped_by=loop.stopped_by(),
-        warnings=[*scene.warnings, *_not_adaptive(settings), *warnings, *getattr(renderer, "warnings", [])],
+        warnings=[
+            *scene.warnings,
+            *_not_adaptive(settings),
+            *warnings,
+            *door.warnings(stats, scene),
+            *getattr(renderer, "warnings", []),
+        ],
+        geometry_report=door.report(stats, scene),
         effects=effects,
     )
     if loop.adaptive is not None:

@@ -57,6 +57,7 @@ def _merged(scene: Scene, halves: list[Result]) -> Result:
         "clamped_units",
         "cut_units",
         "non_finite_samples",
+        *ledger.REFUSALS,
         "samples",
         "render_seconds",
         "prepare_seconds",

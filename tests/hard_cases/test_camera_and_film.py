@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from luch import core
 from luch.render import render
 from luch.scene import F32, Camera, Film, Instances, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder, float_word
@@ -154,6 +155,38 @@ def test_59_equal_samples_have_their_own_mean(strength: float, samples: int) -> 
     error = np.abs(pixels[..., :3] / np.float32(strength) - 1).max()
     print(f"{samples} samples of {strength}: relative error {error:.1e}")
     assert error <= 1e-6
+
+
+def test_60_a_deviation_on_a_bright_ground_is_that_of_two_passes() -> None:
+    """A million and noise of 1: what two halves differ by, against their means in double."""
+    count, rng = 4096, np.random.default_rng(60)
+    samples = (1e6 + rng.normal(size=(count, 3))).astype(np.float32)
+    film = core.film.Film(Film(width=1, height=1), marks=True)
+    channel = film.channel("Combined")
+    film.add_samples(0, channel, samples[: count // 2])
+    film.count_samples(0, count // 2)
+    film.mark(0, count // 2)
+    film.add_samples(0, channel, samples[count // 2 :])
+    film.count_samples(0, count // 2)
+    mean, deviation, share = film.deviations()
+    halves = samples.astype(np.float64).reshape(2, count // 2, 3).mean(axis=1)
+    assert share == 0.5
+    np.testing.assert_allclose(mean[0, 0], samples.mean(axis=0, dtype=np.float64), rtol=1e-7)
+    np.testing.assert_allclose(np.abs(deviation[0, 0]), np.abs(halves[0] - halves[1]) / 2.0, rtol=1e-3)
+
+
+def test_60_merged_parts_vary_as_one(count: int = 1 << 14) -> None:
+    """Sums of parts are added, in double: no order of them moves the mean of a million and noise of 1."""
+    samples = (1e6 + np.random.default_rng(61).normal(size=(count, 3))).astype(np.float32)
+    whole, parts = (core.film.Film(Film(width=1, height=1)) for _ in range(2))
+    whole.add_samples(0, whole.channel("Combined"), samples)
+    for part in np.array_split(samples, 7):
+        one = core.film.Film(Film(width=1, height=1))
+        one.add_samples(0, one.channel("Combined"), part)
+        one.count_samples(0, len(part))
+        parts.merge(one)
+    whole.count_samples(0, count)
+    assert whole.resolve()["Combined"].tobytes() == parts.resolve()["Combined"].tobytes()
 
 
 @pytest.mark.parametrize("strength", [1e-38, 1e-20, 1e10, 1e30, 1e35])

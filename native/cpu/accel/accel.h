@@ -12,6 +12,16 @@
 
 namespace luch::cpu {
 
+// Primitives of a mesh that no structure holds, by cause; instances that were taken to the world count one by one.
+struct LeftOut {
+    u32 mesh;
+    u64 invalid = 0;  // a vertex is not finite or its index lies outside the mesh; a sphere is not finite
+    u64 too_far = 0;  // beyond LARGEST_COORDINATE
+    u64 empty = 0;    // no area, no size
+    u64 copies = 0;   // the same corners as one that counts before them: no ray tells them apart
+};
+enum class LeftOutCause : u8 { NONE_, INVALID, TOO_FAR, EMPTY, COPY };
+
 struct AccelStats {
     u64 triangles = 0;          // kept, counted once per mesh (once per instance where meshes are merged)
     u64 spheres = 0;            // kept, once per mesh
@@ -21,6 +31,8 @@ struct AccelStats {
     u64 dropped_triangles = 0;  // a vertex is not finite, its index lies outside the mesh, or there is no area
     u64 dropped_spheres = 0;    // not finite, or of no size
     u64 dropped_pieces = 0;     // not finite, or of no radius
+    u64 duplicates = 0;         // see LeftOut::copies
+    std::vector<LeftOut> left_out;  // by mesh, those that lost something
     double build_seconds = 0.0;
 };
 

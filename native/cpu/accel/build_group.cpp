@@ -1,4 +1,4 @@
-// Gathering a group's primitives, and its tree.
+// A group's tree, over the primitives that gather.h finds.
 #include <algorithm>
 #include <atomic>
 #include <stdexcept>
@@ -6,13 +6,12 @@
 #include "cpu/accel/accel.h"
 #include "cpu/accel/build_bvh8.h"
 #include "cpu/accel/build_moving.h"
+#include "cpu/accel/gather.h"
 #include "cpu/accel/group.h"
 #include "cpu/accel/tree2.h"
 
 namespace luch::cpu {
 namespace {
-
-constexpr size_t GATHER_CHUNK = 16384;  // primitives
 
 constexpr u32 TRIANGLES_A_BLOCK = 4, SPHERES_A_BLOCK = 8, PIECES_A_BLOCK = 8;
 
@@ -20,69 +19,6 @@ u32 leaf_width(const Group& group) {
     constexpr u32 width[] = {TRIANGLES_A_BLOCK, SPHERES_A_BLOCK, PIECES_A_BLOCK};
     return width[size_t(group.kind)];
 }
-
-struct Corners3 {
-    Vec3 p[3];
-};
-
-// Reads primitives by ref, in the group's space.
-class Gather {
- public:
-    Gather(const Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags)
-        : group_(group), scene_(scene), flags_(flags) {}
-
-    u32 ref_count() const {
-        const Member& last = group_.members.back();
-        return last.first_ref + last.prim_count;
-    }
-    // False for a triangle that cannot be traced: an index outside the mesh, a vertex that is not finite, no area.
-    bool read(u32 ref, const Member& member, Corners3* out) const {
-        const MeshView& mesh = scene_.meshes[member.mesh];
-        const u32* indices = scene_.triangles + 3 * (size_t(mesh.first_triangle) + member.prim_of(ref));
-        for (int k = 0; k < 3; ++k) {
-            if (indices[k] >= mesh.vertex_count) return false;
-            const float* p = scene_.positions + 3 * (size_t(mesh.first_vertex) + indices[k]);
-            Vec3 point = {p[0], p[1], p[2]};
-            if (member.instance != NONE) point = transform_point(scene_.instances[member.instance].to_world, point);
-            out->p[k] = point;
-        }
-        return triangle_can_be_traced(out->p[0], out->p[1], out->p[2]);
-    }
-    // False for a sphere that is not finite or has no size.
-    bool read(u32 ref, const Member& member, Sphere* out) const {
-        const float* s = sphere_at(scene_, scene_.meshes[member.mesh], member.prim_of(ref));
-        *out = {{s[0], s[1], s[2]}, s[3]};
-        return sphere_can_be_traced(*out);
-    }
-    bool read_box(u32 ref, const Member& member, Box* out) const {
-        if (group_.kind == GroupKind::CURVES) {
-            if (!piece_can_be_traced(group_.curves, ref)) return false;
-            *out = capsule_box(piece_capsule(group_.curves, ref));
-            return true;
-        }
-        if (group_.kind == GroupKind::SPHERES) {
-            Sphere s;
-            if (!read(ref, member, &s)) return false;
-            *out = sphere_box(s.center, s.radius);
-            return true;
-        }
-        Corners3 c;
-        if (!read(ref, member, &c)) return false;
-        *out = triangle_box(c.p[0], c.p[1], c.p[2]);
-        return true;
-    }
-    bool has_flags() const { return !flags_.empty(); }
-    u32 flagged(u32 ref, const Member& member) const {
-        if (flags_.empty() || flags_[member.mesh].empty()) return ref;
-        u8 flag = flags_[member.mesh][member.prim_of(ref)];
-        return flag & PRIMITIVE_MAY_BE_TRANSPARENT ? ref | REF_TRANSPARENT : ref;
-    }
-
- private:
-    const Group& group_;
-    const SceneView& scene_;
-    const std::vector<std::vector<u8>>& flags_;
-};
 
 // The mesh's curves: the scene may go away.
 void copy_curves(Group& group, const SceneView& scene) {
@@ -94,33 +30,6 @@ void copy_curves(Group& group, const SceneView& scene) {
     group.curve_points.assign(group.curves.points, group.curves.points + 4 * size_t(points));
     group.curves.points = group.curve_points.data();
     group.curves.segments = group.curve_segments.data();
-}
-
-// The boxes of the primitives kept, in order of ref.
-HugeArray<PrimBox> gather_boxes(const Group& group, const Gather& gather, ThreadPool& pool, size_t* kept) {
-    size_t refs = gather.ref_count();
-    HugeArray<PrimBox> boxes(refs);
-    std::vector<size_t> filled((refs + GATHER_CHUNK - 1) / GATHER_CHUNK);
-    pool.parallel_for(refs, GATHER_CHUNK, [&](size_t begin, size_t end, unsigned) {
-        size_t next = begin;
-        const Member* member = &group.member_of(u32(begin));
-        const Member* last = &group.members.back();
-        for (size_t ref = begin; ref < end; ++ref) {
-            while (member != last && ref >= member[1].first_ref) ++member;
-            Box b;
-            if (!gather.read_box(u32(ref), *member, &b)) continue;
-            boxes[next++] = {{-b.lo.x, -b.lo.y, -b.lo.z}, u32(ref), {b.hi.x, b.hi.y, b.hi.z}, 0};
-        }
-        filled[begin / GATHER_CHUNK] = next - begin;
-    });
-    size_t next = filled.empty() ? 0 : filled[0];
-    for (size_t chunk = 1; chunk < filled.size(); ++chunk) {
-        if (next != chunk * GATHER_CHUNK)
-            std::copy_n(boxes.data() + chunk * GATHER_CHUNK, filled[chunk], boxes.data() + next);
-        next += filled[chunk];
-    }
-    *kept = next;
-    return boxes;
 }
 
 void fill_block(Block4& block, const u32* refs, u32 count, const Group& group, const Gather& gather) {
@@ -276,6 +185,16 @@ Tree8 collapse_tree(Group& group, const PrimBox* boxes, size_t kept, const Gathe
 
 }  // namespace
 
+void add_left_out(const LeftOut& more, std::vector<LeftOut>* all) {
+    auto found =
+        std::lower_bound(all->begin(), all->end(), more.mesh, [](const LeftOut& a, u32 mesh) { return a.mesh < mesh; });
+    if (found == all->end() || found->mesh != more.mesh) found = all->insert(found, {more.mesh});
+    found->invalid += more.invalid;
+    found->too_far += more.too_far;
+    found->empty += more.empty;
+    found->copies += more.copies;
+}
+
 Group::Group() = default;
 Group::Group(Group&&) noexcept = default;
 Group& Group::operator=(Group&&) noexcept = default;
@@ -289,7 +208,7 @@ void build_group(Group& group, const SceneView& scene, const std::vector<std::ve
     size_t kept = 0;
     HugeArray<PrimBox> boxes = gather_boxes(group, gather, pool, &kept);
     group.kept = kept;
-    group.dropped = gather.ref_count() - kept;
+    group.dropped = gather.ref_count() - kept - group.duplicates;
     group.root = empty_box();
     if (kept == 0) return;
     group.precision = choice.precision;

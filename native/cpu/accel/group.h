@@ -39,7 +39,8 @@ struct Group {
     Box root;
     bool deforms = false;  // its mesh changes its shape: moving holds it, and nothing above
     std::unique_ptr<MovingTrees> moving;
-    u64 kept = 0, dropped = 0;  // primitives
+    u64 kept = 0, dropped = 0, duplicates = 0;  // primitives
+    std::vector<LeftOut> left_out;  // by mesh
 
     Group();
     Group(Group&&) noexcept;
@@ -48,6 +49,9 @@ struct Group {
 
     const Member& member_of(u32 ref) const { return luch::member_of(members.data(), u32(members.size()), ref); }
 };
+
+// Adds to the row of the same mesh; rows are sorted by mesh.
+void add_left_out(const LeftOut& more, std::vector<LeftOut>* all);
 
 // Fills everything but members, kind and deforms, which say what to gather. flags: per mesh, per primitive PrimitiveFlag.
 void build_group(Group& group, const SceneView& scene, const std::vector<std::vector<u8>>& flags,

@@ -9,7 +9,6 @@ namespace {
 
 // Groups below this size are built side by side, one thread each.
 constexpr u32 SMALL_GROUP_REFS = 65536;
-constexpr float CONDITION_LIMIT = 1000.0f;  // worse instances get wider boxes instead of widening every ray
 
 float row_sum(const Affine& a, int row) {
     return abs_f(a.m[4 * row]) + abs_f(a.m[4 * row + 1]) + abs_f(a.m[4 * row + 2]);
@@ -138,15 +137,23 @@ class Planner {
 
 }  // namespace
 
+std::vector<u8> instances_in_world(const SceneView& scene, u64 flatten_triangles) {
+    std::vector<u8> flatten = meshes_to_flatten(scene, flatten_triangles), out(scene.instance_count);
+    for (u32 i = 0; i < scene.instance_count; ++i) {
+        const InstanceView& instance = scene.instances[i];
+        out[i] = flatten[instance.mesh] && !(instance.flags & (INSTANCE_MOVES | INSTANCE_DEFORMS));
+    }
+    return out;
+}
+
 ScenePlan plan_scene(const SceneView& scene, u64 flatten_triangles) {
-    std::vector<u8> flatten = meshes_to_flatten(scene, flatten_triangles);
+    std::vector<u8> in_world = instances_in_world(scene, flatten_triangles);
     Planner planner(scene);
     for (u32 i = 0; i < scene.instance_count; ++i) {
         const InstanceView& instance = scene.instances[i];
         const MeshView& mesh = scene.meshes[instance.mesh];
         if (instance.visibility == 0) continue;
-        bool still = !(instance.flags & (INSTANCE_MOVES | INSTANCE_DEFORMS));
-        if (mesh.triangle_count > 0 && flatten[instance.mesh] && still)
+        if (mesh.triangle_count > 0 && in_world[i])
             planner.add_to_world(i);
         else if (mesh.triangle_count > 0)
             planner.share_triangles(i);
@@ -181,6 +188,8 @@ void count_primitives(const Group& group, AccelStats* stats) {
         *dropped[] = {&stats->dropped_triangles, &stats->dropped_spheres, &stats->dropped_pieces};
     *kept[size_t(group.kind)] += group.kept;
     *dropped[size_t(group.kind)] += group.dropped;
+    stats->duplicates += group.duplicates;
+    for (const LeftOut& of_group : group.left_out) add_left_out(of_group, &stats->left_out);
 }
 
 EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene) {
@@ -211,7 +220,7 @@ EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene) {
             const InstanceMotion& way = plan.motion.entries[motion - 1].transform;
             c = max_f(c, swept_condition(plan.motion.keys.data() + way.first_key, way.key_count));
         }
-        if (c > CONDITION_LIMIT)
+        if (c > INSTANCE_CONDITION_WIDENED)
             wider = INSTANCE_ERROR * c * 4.0f * out.error.size;  // for origins within thrice the scene's size
         else
             out.error.scale = max_f(INSTANCE_ERROR * c, out.error.scale);

@@ -16,6 +16,9 @@ struct ScenePlan {
     u64 dropped_triangles = 0, dropped_spheres = 0, dropped_pieces = 0;  // of instances whose transforms are not finite
 };
 
+// By instance: whether its triangles are taken to the world (one user of the mesh alone, or few copies), not moving.
+std::vector<u8> instances_in_world(const SceneView& scene, u64 flatten_triangles);
+
 // flatten_triangles: how many copies of triangles there may be of instances taken to the world.
 ScenePlan plan_scene(const SceneView& scene, u64 flatten_triangles);
 

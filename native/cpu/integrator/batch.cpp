@@ -18,7 +18,7 @@ const float* times_of(const std::vector<float>& times, int from) {
 
 Batch::Batch(const RenderScene& scene, const FilmView& film)
     : scene_(scene),
-      writer_{film, 0},
+      writer_{film, counts_.refused},
       scratch_(std::make_unique<Scratch>()),
       registers_(scene.max_registers * SHADE_LANES) {
     paths_.resize(BATCH_PATHS);
@@ -56,7 +56,7 @@ void BatchCounts::add(const BatchCounts& other) {
     rays += other.rays;
     shadow_rays += other.shadow_rays;
     surface_points += other.surface_points;
-    bad_samples += other.bad_samples;
+    for (u32 cause = 0; cause < REFUSALS; cause++) refused[cause] += other.refused[cause];
     clamped += other.clamped;
     cut += other.cut;
     lens_samples += other.lens_samples;
@@ -72,7 +72,6 @@ void BatchCounts::add(const BatchCounts& other) {
 
 BatchCounts Batch::counts() const {
     BatchCounts counts = counts_;
-    counts.bad_samples += writer_.rejected;
     counts.clamped += writer_.clamped;
     counts.cut += writer_.cut;
     return counts;

@@ -20,7 +20,8 @@ inline constexpr int BATCH_PATHS = 2048;
 inline constexpr int CAMERA_LANES = 16;
 
 struct BatchCounts {
-    u64 paths = 0, rays = 0, shadow_rays = 0, surface_points = 0, bad_samples = 0;
+    u64 paths = 0, rays = 0, shadow_rays = 0, surface_points = 0;
+    u64 refused[REFUSALS] = {};  // by cause
     u64 clamped = 0, cut = 0;   // as FilmWriter has them
     u64 lens_samples = 0;       // camera rays that chose a point of the aperture
     u64 time_samples = 0;       // and a time, where something moves

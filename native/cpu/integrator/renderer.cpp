@@ -4,6 +4,7 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "cpu/accel/scene_plan.h"
 #include "cpu/shade/interpreter.h"
 #include "cpu/sky/world_sun.h"
 #include "luch/shade/surface_setup.h"
@@ -34,6 +35,20 @@ Color evaluate_emission(const SceneView& view, const Program& program, const Sha
     return sets[0].emission;
 }
 
+// Instances with a material that scatters under the surface; empty: there is none.
+std::vector<u8> instances_with_subsurface(const SceneView& view) {
+    std::vector<u8> wanted(view.instance_count);
+    bool any = false;
+    for (u32 i = 0; i < view.instance_count; i++) {
+        const InstanceView& instance = view.instances[i];
+        for (u32 slot = 0; slot < instance.material_count; slot++) {
+            u32 material = view.material_table[instance.first_material + slot];
+            if (view.materials[material].program.flags & PROGRAM_SUBSURFACE) wanted[i] = any = true;
+        }
+    }
+    return any ? wanted : std::vector<u8>();
+}
+
 }  // namespace
 
 Renderer::Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input)
@@ -50,6 +65,7 @@ bool Renderer::prepare() {
 
 void Renderer::build_all() {
     scene_.view = store_->finish();
+    mark_in_world();
     double start = seconds_now();
     if (input_.for_device)
         build_device_trees();
@@ -91,6 +107,15 @@ void Renderer::build_all() {
     }
 }
 
+// Walks under a surface trace its object in the object's own space, whatever the scene's trees hold.
+void Renderer::mark_in_world() {
+    std::vector<u8> in_world = instances_in_world(scene_.view, FLATTEN_TRIANGLES);
+    std::vector<u8> walked = instances_with_subsurface(scene_.view);
+    for (size_t i = 0; i < walked.size(); i++)
+        if (walked[i]) in_world[i] = 0;
+    store_->mark_in_world(in_world);
+}
+
 // Paths have times only where something moves: a shutter that is open over what stands still costs nothing.
 void Renderer::build_shutter() {
     const MotionInput& in = input_.motion;
@@ -122,20 +147,6 @@ void Renderer::build_accel() {
     stats_.accel_reason = chosen.reason;
     stats_.accel = accel_->stats();
     scene_.accel = accel_.get();
-}
-
-// Instances with a material that scatters under the surface; empty: there is none.
-static std::vector<u8> instances_with_subsurface(const SceneView& view) {
-    std::vector<u8> wanted(view.instance_count);
-    bool any = false;
-    for (u32 i = 0; i < view.instance_count; i++) {
-        const InstanceView& instance = view.instances[i];
-        for (u32 slot = 0; slot < instance.material_count; slot++) {
-            u32 material = view.material_table[instance.first_material + slot];
-            if (view.materials[material].program.flags & PROGRAM_SUBSURFACE) wanted[i] = any = true;
-        }
-    }
-    return any ? wanted : std::vector<u8>();
 }
 
 void Renderer::build_local_trees() {

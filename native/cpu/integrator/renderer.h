@@ -125,6 +125,7 @@ class Renderer {
     void build_device_trees();
     void find_constants();
     void build_lights();
+    void mark_in_world();
     void build_shutter();
     WorldSun find_sun(WorldInput& world);  // and tells the world of it
     std::vector<float> world_map(int width, int height, const WorldSun& sun);

@@ -2,15 +2,10 @@
 #include <cmath>
 
 #include "cpu/light/build.h"
+#include "luch/math/bounds.h"
 
 namespace luch::cpu {
 namespace {
-
-// Lamps below this extent (m) are points: their radiance would leave float's range.
-constexpr float SMALLEST_RADIUS = 1e-8f;
-// Area lamps never get smaller; their flux stays what it is.
-constexpr float SMALLEST_EXTENT = 1e-6f;
-constexpr float LARGEST_RADIANCE = 1e30f;
 
 Vec3 column(const Affine& a, int i) { return {a.m[i], a.m[4 + i], a.m[8 + i]}; }
 

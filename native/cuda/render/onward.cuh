@@ -55,7 +55,7 @@ __device__ __forceinline__ void send_on(const RenderTask& task, PathState& path,
     const Wavefront& wave = task.wave;
     Ray next;
     Vec3 u = sample_3d(path.sampler, path.dimension + DIM_BSDF);
-    FilmWriter writer{task.film, 0};
+    FilmWriter writer{task.film, task.wave.totals + TOTAL_REFUSED};
     bool goes_on = scatter(task.scene, writer, path, points, 0, set, spawn, u, direction, distance, &next);
     add_totals(wave, writer);
     if (!goes_on) return;

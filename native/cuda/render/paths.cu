@@ -111,7 +111,7 @@ extern "C" __global__ void merge_layers(const __grid_constant__ luch::RenderTask
     using namespace luch;
     u32 pixel = stage_index();
     if (pixel >= task.wave.film_pixels) return;
-    FilmWriter to{task.film, 0};
+    FilmWriter to{task.film, nullptr};
     for (u32 layer = 1; layer < layers; ++layer) {
         FilmView from = task.film;
         from.rows += u64(layer) * task.wave.layer_stride;

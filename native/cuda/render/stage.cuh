@@ -23,7 +23,6 @@ __device__ __forceinline__ void add_total(const Wavefront& wave, WaveTotal total
 
 // What a writer has counted.
 __device__ __forceinline__ void add_totals(const Wavefront& wave, const FilmWriter& writer) {
-    add_total(wave, TOTAL_REJECTED, writer.rejected);
     add_total(wave, TOTAL_CLAMPED, writer.clamped);
     add_total(wave, TOTAL_CUT, writer.cut);
 }

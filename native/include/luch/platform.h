@@ -64,6 +64,13 @@ LUCH_FN float larger(float a, float b) { return a > b ? a : b; }
 LUCH_FN float smaller(float a, float b) { return a < b ? a : b; }
 #endif
 
+// Counts what is rare, where many threads may count at once.
+#if defined(__CUDA_ARCH__)
+LUCH_FN void count_one(u64* counter) { atomicAdd(counter, 1ull); }
+#else
+LUCH_FN void count_one(u64* counter) { ++*counter; }
+#endif
+
 LUCH_FN u32 float_bits(float x) { return __builtin_bit_cast(u32, x); }
 LUCH_FN float bits_float(u32 x) { return __builtin_bit_cast(float, x); }
 

@@ -25,6 +25,7 @@ from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.timing import TIMED, StageClocks
 from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
 from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, tiled, too_large
+from luch.ledger import REFUSALS
 
 BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
 # Paths under way at once, for each multiprocessor, rounded down to a power of two. Late bounces of few paths leave a GPU
@@ -40,8 +41,8 @@ MEMORY_SHARE = 0.85
 # Part of the free memory that a scene may take; film and paths want some, too.
 SCENE_SHARE = 0.8
 TREE_BYTES = 200  # of a triangle whose tree the device builds: its corners, its node's share, the builder's work space
-TOTALS = ("surface_points", "non_finite_samples", "transparent_steps", "transparent_rays", "world_points",
-          "light_points", "subsurface_walks", "subsurface_steps", "flights", "clamped_units", "cut_units")  # WaveTotal  # fmt: skip
+TOTALS = ("surface_points", "transparent_steps", "transparent_rays", "world_points",
+          "light_points", "subsurface_walks", "subsurface_steps", "flights", "clamped_units", "cut_units", *REFUSALS)  # WaveTotal  # fmt: skip
 
 
 # Pixels of the film, in order (None: all), and their samples: the first and how many.
@@ -403,6 +404,7 @@ class DeviceRenderer(HostFilm):
         with self._device:
             totals = dict(zip(TOTALS, (int(x) for x in self._memory.totals.get()), strict=True))
             shading = self._shading_kernel()
+        totals["non_finite_samples"] = sum(totals[cause] for cause in REFUSALS)
         counts = {**self._counts, **totals}
         counts["shadow_rays"] += counts.pop("transparent_rays")
         return counts | {

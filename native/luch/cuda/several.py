@@ -17,10 +17,11 @@ from luch.adaptive import parts, regions_of
 from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy, require_sound
 from luch.cuda.render import DeviceRenderer, HostFilm, HostScene, parted
 from luch.cuda.trace import TreesTooDeep
+from luch.ledger import REFUSALS
 
 # Counts and seconds that are added up; of other statistics the first device's stand for all.
 SUMMED = ("paths", "rays", "shadow_rays", "surface_points", "non_finite_samples", "clamped_units", "cut_units", "transparent_steps", "world_points",
-          "light_points", "device_scene_bytes", "device_film_and_paths_bytes", "paths_at_once", "subsurface_walks", "subsurface_steps")  # fmt: skip
+          "light_points", "device_scene_bytes", "device_film_and_paths_bytes", "paths_at_once", "subsurface_walks", "subsurface_steps", *REFUSALS)  # fmt: skip
 
 
 def renderer_for(scene: Any) -> Any:

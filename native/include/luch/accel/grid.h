@@ -15,11 +15,10 @@
 // best t (not at it: a smaller ref may follow). Cells at the border reach outwards without end.
 #pragma once
 #include "luch/accel/cell_refs.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
-inline constexpr float GRID_MARGIN = 1.0f / 128.0f;
-inline constexpr float GRID_DOUBT = 32.0f;
 inline constexpr u32 GRID_MAX_BITS = 28;  // 2^28 cells
 
 struct GridShape {

@@ -30,12 +30,6 @@ struct alignas(16) GroupEntry {
 };
 static_assert(sizeof(GroupEntry) == 64);
 
-// How far a ray seen through an instance may differ from the ray in the world, at a point of size p: the
-// origin and direction round in the transform, and to_object is only nearly the inverse of to_world. With
-// C = |to_world| |to_object| (largest row sum of the linear parts) each is at most gamma(3) C |p|; three of
-// them, doubled for second order terms.
-inline constexpr float INSTANCE_ERROR = 18.0f * EPS;
-
 // By how much the entries' boxes must be wider for a ray: what all entries need together.
 struct EntryError {
     float scale;  // INSTANCE_ERROR times the largest C

@@ -26,7 +26,6 @@
 namespace luch {
 
 inline constexpr float PLANE_BIAS = 32768.0f;
-inline constexpr float PLANE_MARGIN = 1.0f / 128.0f;  // steps of the grid
 inline constexpr float WIDEST = 1e27f;  // extent of a node's box
 inline constexpr u32 SMALLEST_STEP = 20;  // biased exponents: 2^-107, so that A is no denormal,
 inline constexpr u32 LARGEST_STEP = 217;  // 2^90

@@ -2,10 +2,9 @@
 #pragma once
 #include "luch/bsdf/lobe_value.h"
 #include "luch/bsdf/microfacet.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
-
-inline constexpr float PHONG_MIN_ALPHA = 1e-4f;  // sharper lobes are mirrors
 
 LUCH_FN bool is_phong_mirror(const Lobe& l) { return max_f(l.alpha_x, l.alpha_y) <= PHONG_MIN_ALPHA; }
 LUCH_FN float phong_exponent(float alpha) { return 2.0f / sqr(alpha) - 2.0f; }

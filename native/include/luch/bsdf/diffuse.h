@@ -1,12 +1,10 @@
 // Lambert, Oren-Nayar and translucent lobes.
 #pragma once
 #include "luch/bsdf/lobe_value.h"
+#include "luch/math/bounds.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
-
-// Below this roughness Oren-Nayar is Lambert.
-inline constexpr float OREN_NAYAR_MIN_ROUGHNESS = 1e-5f;
 
 // Fujii's Oren-Nayar: the directional albedo is PI A + B G(cos). Source: Fujii, "A tiny improvement
 // of Oren-Nayar reflectance model"; the compensation of lost energy is OpenPBR's.

@@ -7,14 +7,10 @@
 #include "luch/bsdf/beckmann.h"
 #include "luch/bsdf/lobe_fresnel.h"
 #include "luch/bsdf/lobe_value.h"
+#include "luch/math/bounds.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
-
-// alpha_x alpha_y below which a lobe is a perfect mirror.
-inline constexpr float MIRROR_ALPHA2 = 2e-10f;
-// |ior - 1| below which refraction is straight through.
-inline constexpr float STRAIGHT_IOR = 1e-4f;
 
 LUCH_FN bool is_mirror(const Lobe& l) { return l.alpha_x * l.alpha_y <= MIRROR_ALPHA2; }
 LUCH_FN bool is_anisotropic(const Lobe& l) { return plan::ANISOTROPY && l.alpha_x != l.alpha_y; }

@@ -2,12 +2,10 @@
 #pragma once
 #include "luch/bsdf/closure.h"
 #include "luch/bsdf/path_flag.h"
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 
 namespace luch {
-
-// Lobes weaker than this are not worth a sample.
-inline constexpr float LOBE_WEIGHT_CUTOFF = 1e-5f;
 
 struct SetupContext {
     Vec3 n;    // interpolated shading normal, unit, on the side of the ray

@@ -3,12 +3,11 @@
 #pragma once
 #include "luch/bsdf/params.h"
 #include "luch/bsdf/setup_context.h"
+#include "luch/math/bounds.h"
 #include "luch/plan.h"
 
 namespace luch {
 
-// Channels with smaller mean free paths are diffuse, metres (as in Cycles).
-inline constexpr float SUBSURFACE_MIN_RADIUS = 1e-8f;
 // A mean free path must also be this many units in the last place of the point's position (as seen from the camera):
 // walks begin inside the surface by its error bound, about 20 of them, and would lose themselves in rounding. Shorter
 // ones are a sixtieth of a pixel and less in a picture of 1,000.

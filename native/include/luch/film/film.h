@@ -46,10 +46,20 @@ struct FilmView {
     FilmSum origin[3];   // Scene.origin: added to the Position pass
 };
 
+// Where a value came to light that is not finite. None should: each is a bug, or a number that a user's nodes made.
+enum Refusal : u32 {
+    REFUSED_EMISSION,  // light that a path met: an emitter, a lamp, the world
+    REFUSED_DIRECT,    // light that was sampled
+    REFUSED_SCATTER,   // a closure's sample
+    REFUSED_FLIGHT,    // a point or a weight in a volume
+    REFUSED_DATA,      // what a pass shows
+    REFUSALS
+};
+
 // What one worker holds. Values that are not finite never enter; they are counted.
 struct FilmWriter {
     FilmView film;
-    u64 rejected;
+    u64* refused;  // REFUSALS counters
     // What settings took, in fixed point: sums that no order of threads changes.
     u64 clamped = 0;  // light that a limit cut off Combined; CLAMPED_UNIT
     u64 cut = 0;      // throughput of paths that a limit of bounces ended at a surface; CUT_UNIT
@@ -69,7 +79,7 @@ LUCH_FN FilmSum* film_row(const FilmView& film, u32 pixel) {
 LUCH_FN void film_add(FilmWriter& writer, u32 pixel, u32 channel, float value) {
     if (channel == NONE) return;
     if (!finite_f(value)) {
-        ++writer.rejected;
+        count_one(writer.refused + REFUSED_DATA);
         return;
     }
     film_row(writer.film, pixel)[channel] += value;
@@ -78,7 +88,7 @@ LUCH_FN void film_add(FilmWriter& writer, u32 pixel, u32 channel, float value) {
 LUCH_FN void film_add(FilmWriter& writer, u32 pixel, u32 channel, Color value) {
     if (channel == NONE) return;
     if (!all_finite(value)) {
-        ++writer.rejected;
+        count_one(writer.refused + REFUSED_DATA);
         return;
     }
     FilmSum* to = film_row(writer.film, pixel) + channel;

@@ -109,10 +109,6 @@ struct Capsule {
     float radius;
 };
 
-// Of the radius: how near the test of round curves comes to the surface, and how far along the axis its hit may lie off
-// the circle that it is on.
-inline constexpr float THICK_TOLERANCE = 1e-4f, PLANE_TOLERANCE = 1e-3f;
-
 // Widened by what the tests may stray: their points are taken relative to the segment, which rounds at its size; here
 // they are found in the mesh's space, which rounds at that of its coordinates; and by the ray's cone (math/bounds.h, 1).
 LUCH_FN Capsule widened(Capsule c, const CurveSegment& s) {

@@ -1,6 +1,7 @@
 // What moves while the shutter is open: transforms and points at *keys*, evenly spaced from time 0, when it opens, to time
 // 1, when it closes, and what lies between them. The CPU and CUDA get the same bits from the same keys.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 #include "luch/math/vec.h"
 
@@ -39,9 +40,6 @@ LUCH_FN float between(float a, float b, float share) { return clamp_f(a + (b - a
 LUCH_FN Vec3 between(Vec3 a, Vec3 b, float share) {
     return {between(a.x, b.x, share), between(a.y, b.y, share), between(a.z, b.z, share)};
 }
-
-// From this cosine on, an arc is as good as its chord: they differ by 2e-6 of the angle.
-inline constexpr float SHORT_ARC_COSINE = 0.9995f;
 
 // Along the great circle, at even speed.
 LUCH_FN_SLOW void rotation_between(const float* a, const float* b, float share, float* out) {

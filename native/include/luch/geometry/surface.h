@@ -50,15 +50,28 @@ LUCH_FN Vec3 entered_at(const Sphere& sphere, Vec3 origin, Vec3 direction) {
     return normalize_or(n, -normalize(direction));
 }
 
-// The point (1 - u - v) p0 + u p1 + v p2 of an object-space triangle.
-LUCH_FN SurfacePoint triangle_point(Vec3 p0, Vec3 p1, Vec3 p2, float u, float v, const Affine& to_world,
-                                    const Affine& to_object) {
-    float b0 = 1.0f - u - v;
-    Vec3 a = b0 * p0, b = u * p1, c = v * p2;
-    Vec3 object = a + b + c;
-    float extent = max_component(max_v(max_v(abs_v(p0 - object), abs_v(p1 - object)), abs_v(p2 - object)));
-    Vec3 object_error = gamma_f(7) * (abs_v(a) + abs_v(b) + abs_v(c)) + make_vec3(gamma_f(7) * extent);
-    return instance_point(object, object_error, extent, to_world, to_object);
+// Of a triangle as rays are tested with it: the point (1 - u - v) p0 + u p1 + v p2, its error, and how far the corners
+// are from it at most.
+struct TrianglePoint {
+    Vec3 p, error;
+    float extent;
+};
+LUCH_FN TrianglePoint traced_point(const Triangle& t, float u, float v) {
+    Vec3 b = u * (t.p[1] - t.p[0]), c = v * (t.p[2] - t.p[0]);
+    Vec3 p = t.p[0] + (b + c);
+    float extent = max_component(max_v(max_v(abs_v(t.p[0] - p), abs_v(t.p[1] - p)), abs_v(t.p[2] - p)));
+    return {p, gamma_f(1) * abs_v(p) + gamma_f(5) * (abs_v(b) + abs_v(c)) + make_vec3(gamma_f(7) * extent), extent};
+}
+
+LUCH_FN SurfacePoint triangle_point(const Triangle& t, float u, float v, const InstanceView& instance) {
+    if (instance.flags & INSTANCE_IN_WORLD) {
+        const Affine& m = instance.to_world;  // as the structure's builder took the corners to the world, bit for bit
+        TrianglePoint world =
+            traced_point({{transform_point(m, t.p[0]), transform_point(m, t.p[1]), transform_point(m, t.p[2])}}, u, v);
+        return {world.p, world.error, {}, {}};
+    }
+    TrianglePoint own = traced_point(t, u, v);
+    return instance_point(own.p, own.error, own.extent, instance.to_world, instance.to_object);
 }
 
 // Where a ray from outside enters a sphere of an instance, from the ray's own line: t would bring the digits of the distance.
@@ -137,8 +150,7 @@ LUCH_FN SurfacePoint surface_point(const SceneView& scene, const Hit& hit, const
         const float* s = sphere_at(scene, mesh, hit.prim);
         return sphere_point({{s[0], s[1], s[2]}, s[3]}, ray, instance.to_world, instance.to_object);
     }
-    Triangle t = triangle_at(scene, instance, hit.prim, time);
-    return triangle_point(t.p[0], t.p[1], t.p[2], hit.u, hit.v, instance.to_world, instance.to_object);
+    return triangle_point(triangle_at(scene, instance, hit.prim, time), hit.u, hit.v, instance);
 }
 
 // Where a ray in `direction` leaves p: off the surface by its error bound, to the side that the direction

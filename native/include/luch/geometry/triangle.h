@@ -5,6 +5,7 @@
 // The hit of a set of triangles is the smallest t in (t_min, t_max]; on equal t the smaller id.
 #pragma once
 #include "luch/geometry/ray.h"
+#include "luch/math/bounds.h"
 #include "luch/math/vec.h"
 
 namespace luch {
@@ -48,9 +49,6 @@ LUCH_FN bool triangle_has_area(Vec3 p0, Vec3 p1, Vec3 p2) {
     double bx = double(p2.x) - double(p0.x), by = double(p2.y) - double(p0.y), bz = double(p2.z) - double(p0.z);
     return ay * bz != az * by || az * bx != ax * bz || ax * by != ay * bx;
 }
-
-// Larger ones overflow in the boxes and products of the tests.
-inline constexpr float LARGEST_COORDINATE = 1e37f;
 
 LUCH_FN bool point_can_be_traced(Vec3 p) {  // NaN: no
     return abs_f(p.x) <= LARGEST_COORDINATE && abs_f(p.y) <= LARGEST_COORDINATE && abs_f(p.z) <= LARGEST_COORDINATE;

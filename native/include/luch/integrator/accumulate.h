@@ -23,9 +23,9 @@ struct ShadowRay {
 };
 
 // Limits a contribution; false (and counted) when it is not finite: such light never enters.
-LUCH_FN bool admit(const RenderView& scene, FilmWriter& writer, Color& c, u32 bounce) {
+LUCH_FN bool admit(const RenderView& scene, FilmWriter& writer, Color& c, u32 bounce, Refusal cause) {
     if (!finite_v(c)) {
-        ++writer.rejected;
+        count_one(writer.refused + cause);
         return false;
     }
     c = clamp_contribution(c, bounce > 0 ? scene.limits.clamp_indirect : scene.limits.clamp_direct);
@@ -64,7 +64,7 @@ LUCH_FN void add_emission(const RenderView& scene, FilmWriter& writer, const Pat
                           u32 own_pass, u32 lightgroup) {
     Color c = path.throughput * radiance;
     const Color whole = c;
-    if (is_zero(c) || !admit(scene, writer, c, path.bounce > 1 ? 1 : 0)) return;
+    if (is_zero(c) || !admit(scene, writer, c, path.bounce > 1 ? 1 : 0, REFUSED_EMISSION)) return;
     note_clamped(writer, whole, c);
     film_add_combined(writer, path.pixel, c);
     const FilmLayout& layout = writer.film.layout;
@@ -84,14 +84,15 @@ LUCH_FN void add_emission(const RenderView& scene, FilmWriter& writer, const Pat
 // The world behind a transparent film: it shows in the Environment pass alone.
 LUCH_FN void add_environment_only(const RenderView& scene, FilmWriter& writer, const PathState& path, Color radiance) {
     Color c = path.throughput * radiance;
-    if (!is_zero(c) && admit(scene, writer, c, 0)) film_add(writer, path.pixel, writer.film.layout.environment, c);
+    if (!is_zero(c) && admit(scene, writer, c, 0, REFUSED_EMISSION))
+        film_add(writer, path.pixel, writer.film.layout.environment, c);
 }
 
 LUCH_FN void add_direct(const RenderView& scene, FilmWriter& writer, const PathState& path, const ShadowRay& shadow,
                         Color transmittance) {
     Color c = shadow.contribution * transmittance;
     const Color whole = c;
-    if (!admit(scene, writer, c, shadow.bounce)) return;
+    if (!admit(scene, writer, c, shadow.bounce, REFUSED_DIRECT)) return;
     if (plan::AMBIENT_OCCLUSION && shadow.for_ao) {
         film_add(writer, path.pixel, writer.film.layout.ambient_occlusion, c);
         return;

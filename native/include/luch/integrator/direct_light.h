@@ -2,12 +2,9 @@
 #pragma once
 #include "luch/integrator/borders.h"
 #include "luch/integrator/scatter.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
-
-// The shadow ray stops this fraction short of a sampled point, so that the light does not block itself: 84 ulp
-// of the distance, where the point on the light and the ray to it are each off by a few.
-inline constexpr float LIGHT_SHORTENING = 1e-5f;
 
 LUCH_FN Color only(BsdfValue& value, u32 visibility) {
     if (!(visibility & RAY_DIFFUSE)) value.diffuse = make_vec3(0.0f);

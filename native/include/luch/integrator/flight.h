@@ -3,6 +3,7 @@
 #pragma once
 #include "luch/integrator/direct_light.h"
 #include "luch/integrator/medium.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -20,10 +21,6 @@ enum FlightDimension : u32 {
 
 // Borders between the camera and its lens, or near clip, that are looked at.
 inline constexpr u32 MAX_CAMERA_BORDERS = 64;
-
-// Points stay this far from both ends of a flight, so that rounding leaves none on the other side of a border: a
-// part of its length, and of the size of its coordinates (16 ulp).
-inline constexpr float FLIGHT_MARGIN = 1e-6f;
 
 LUCH_FN float channel_sum(Color c) { return c.x + c.y + c.z; }
 

@@ -148,7 +148,7 @@ LUCH_FN bool scatter(const RenderView& scene, FilmWriter& writer, PathState& pat
     BsdfSample s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
     if (!(s.pdf_sa > 0.0f) || is_zero(s.throughput)) return false;
     if (!finite_v(s.throughput)) {
-        ++writer.rejected;
+        count_one(writer.refused + REFUSED_SCATTER);
         return false;
     }
     if (!(path.flags & PATH_PASS_CHOSEN)) choose_passes(writer.film.layout, path, s);

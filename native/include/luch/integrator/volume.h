@@ -71,7 +71,7 @@ LUCH_FN_SLOW FlightEnd scatter_path(const RenderView& scene, FilmWriter& writer,
     Vec3 p = ray.origin + ray.direction * keep_inside(t, flight.length, ray);
     if (is_zero(path.throughput) || !(pdf > 0.0f)) return FlightEnd::LOST;
     if (!finite_v(path.throughput) || !finite_v(p)) {
-        ++writer.rejected;
+        count_one(writer.refused + REFUSED_FLIGHT);
         return FlightEnd::LOST;
     }
     float going_on = continuation_probability(path, scene.limits);

@@ -22,7 +22,6 @@ enum WaveCounter : u32 {
 // Statistics, sums over the whole render.
 enum WaveTotal : u32 {
     TOTAL_SURFACE_POINTS,
-    TOTAL_REJECTED,
     TOTAL_TRANSPARENT_STEPS,
     TOTAL_TRANSPARENT_RAYS,
     TOTAL_WORLD_POINTS,
@@ -32,7 +31,8 @@ enum WaveTotal : u32 {
     TOTAL_FLIGHTS,
     TOTAL_CLAMPED,
     TOTAL_CUT,
-    TOTALS
+    TOTAL_REFUSED,  // REFUSALS of them
+    TOTALS = TOTAL_REFUSED + REFUSALS
 };
 
 // Kernels whose threads tell how long they worked, for the Render Time pass.
@@ -131,7 +131,7 @@ LUCH_FN void store_path(const Wavefront& wave, u32 slot, const PathState& path) 
 // Where a slot's path writes.
 LUCH_FN FilmWriter film_of_slot(const RenderTask& task, u32 slot) {
     u32 layer = slot / task.wave.layer_pixels;
-    FilmWriter writer{task.film, 0};
+    FilmWriter writer{task.film, task.wave.totals + TOTAL_REFUSED};
     writer.film.rows += u64(layer) * task.wave.layer_stride;
     writer.film.sample_counts += u64(layer) * task.wave.film_pixels;
     return writer;

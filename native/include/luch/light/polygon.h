@@ -2,18 +2,11 @@
 // area where it is narrow. All points are relative to the shaded point. Which of the two is chosen
 // depends on the polygon alone, so that a pdf query answers what the sampler did.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
-
-// Up to this ratio of extent to distance an area sample's weight h/d^3 varies by a few percent only.
-inline constexpr float NARROW_RATIO_SQUARED = 0.01f;
-// Below this solid angle (sr) a wide polygon is seen so flat that its angle has few digits left.
-inline constexpr float FLAT_SOLID_ANGLE = 1e-4f;
-// Above this a triangle fills nearly the hemisphere and the cut of it hangs on the last digits of its corners: take the
-// hemisphere itself and lose the few samples that miss.
-inline constexpr float HEMISPHERE_SOLID_ANGLE = 6.0f;
 
 // Density per steradian of a point uniform over `area` that lies at `distance`, the plane being at
 // `height` (of the shaded point over the polygon's plane, >= 0).

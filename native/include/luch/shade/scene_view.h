@@ -38,6 +38,7 @@ enum InstanceFlag : u32 {
     INSTANCE_MOVES = 16u,          // to_world and to_object are those of the shutter's middle: see instance_at_time
     INSTANCE_DEFORMS = 32u,        // so are its mesh's positions and normals
     INSTANCE_HAIR_DEFORMS = 64u,   // so are its mesh's curves
+    INSTANCE_IN_WORLD = 128u,  // all its rays are traced with corners that were taken to the world, never with its own
 };
 
 struct InstanceView {

@@ -1,0 +1,111 @@
+"""What structures cost where geometry is hard, and rays at more places and sizes. Numbers: the rows of the hard cases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from luch.accel import KINDS, Accel, Device, Kind
+from support import closed_meshes
+from support.accel_meshes import Mesh, icosphere, rows, separate, soup
+
+every_kind = pytest.mark.parametrize("kind", KINDS)
+every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
+TREES: list[Kind] = [kind for kind in KINDS if kind not in ("BRUTE_FORCE", "GRID")]
+RAYS = 2000  # a mesh; `build.py bench leaks` traces up to 1e8
+
+
+def leaks_of(mesh: Mesh, kind: Kind, device: Device, seed: int) -> int:
+    """Rays to vertices, edges and faces and of random directions that leave a closed mesh."""
+    accel = Accel(*mesh, kind=kind, device=device)
+    out = 0
+    for number, rays in enumerate(("vertices", "edges", "faces", "random")):
+        made = closed_meshes.RAYS[rays](mesh, np.random.default_rng([seed, number]), RAYS // 4)
+        _, prim, _, _ = accel.closest(made[np.abs(made[:, 4:7]).max(1) > 0])
+        out += int((np.asarray(prim) < 0).sum())
+    return out
+
+
+@every_device
+@every_kind
+def test_05_no_ray_leaves_a_ball_at_any_distance(kind: Kind, device: Device) -> None:
+    level = 2 if kind == "BRUTE_FORCE" else 5
+    for power in range(3, 8):
+        mesh = closed_meshes.moved(icosphere(level), 100.0, 10.0**power)
+        assert leaks_of(mesh, kind, device, power) == 0, f"1e{power}"
+
+
+@every_device
+@every_kind
+def test_06_no_ray_leaves_a_ball_of_any_size(kind: Kind, device: Device) -> None:
+    level = 2 if kind == "BRUTE_FORCE" else 4
+    for power in range(-18, 19, 3):
+        mesh = closed_meshes.moved(icosphere(level), 10.0**power)
+        assert leaks_of(mesh, kind, device, power + 18) == 0, f"1e{power}"
+
+
+def work(mesh: Mesh, kind: Kind, rays: np.ndarray, device: Device = "CPU") -> float:  # type: ignore[type-arg]
+    """Nodes and primitives a ray."""
+    counts = Accel(*mesh, kind=kind, device=device).count(rays)
+    return (counts["nodes"] + counts["primitives"]) / len(rays)
+
+
+@pytest.mark.parametrize("kind", TREES)
+def test_08_a_fan_of_ten_times_the_slivers_costs_a_ray_no_more_than_their_number(kind: Kind) -> None:
+    """The list asks for 20 times the work at 100 times the slivers. Boxes along the axes cannot: docs/numerics.md."""
+    few, many = closed_meshes.bipyramid(1000), closed_meshes.bipyramid(10_000)
+    rays = rows(np.zeros((300, 3)), np.random.default_rng(8).normal(size=(300, 3)))
+    assert work(many, kind, rays) <= (60.0 if kind == "HIERARCHICAL_GRID" else 12.0) * work(few, kind, rays)
+
+
+def copies(count: int) -> Mesh:
+    one = separate(np.array([[(-1, -1, 0), (1, -1, 0), (0, 1, 0)]]))
+    return np.tile(one[0], (count, 1)), np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)
+
+
+@every_device
+@every_kind
+def test_31_copies_of_one_triangle_cost_no_more_than_as_many_random_ones(kind: Kind, device: Device) -> None:
+    count = 100 if kind == "BRUTE_FORCE" else 100_000
+    rng = np.random.default_rng(31)
+    eye = np.column_stack([rng.uniform(-1, 1, (200, 2)), np.full(200, 5.0)])
+    rays = rows(eye, rng.uniform(-0.5, 0.5, (200, 3)) - eye)
+    same, random = (Accel(*mesh, kind=kind, device=device) for mesh in (copies(count), soup(count, 0.02)))
+    spent = [sum(accel.count(rays)[part] for part in ("nodes", "primitives")) for accel in (same, random)]
+    assert spent[0] <= 3 * spent[1]
+    assert same.stats["bytes"] <= 1.5 * random.stats["bytes"]
+    assert (same.closest(rays)[1] <= 0).all(), "the first of them counts"
+
+
+def test_31_copies_are_counted_and_change_no_hit() -> None:
+    mesh = soup(20)
+    points, triangles = mesh
+    rng = np.random.default_rng(1)
+    often = (points, np.concatenate([triangles, *(triangles[rng.permutation(20)] for _ in range(9))]))
+    whole, among = Accel(*mesh), Accel(*often)
+    assert among.stats["duplicate_primitives"] == 180 and among.stats["triangles"] == 20
+    rays = rows(rng.uniform(-2, 2, (2000, 3)), rng.normal(size=(2000, 3)))
+    for a, b in zip(whole.closest(rays), among.closest(rays), strict=True):
+        assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
+
+
+def test_31_a_copy_that_is_not_as_transparent_stays() -> None:
+    points, triangles = copies(3)
+    accel = Accel(points, triangles, may_be_transparent=[True, True, False])
+    ray = rows(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]]))
+    assert accel.stats["duplicate_primitives"] == 1
+    assert accel.stats["triangles"] == 2 and accel.closest(ray)[1][0] == 0
+
+
+@pytest.mark.parametrize("kind", TREES)
+@pytest.mark.parametrize("distance", [0.0, 1e5])
+def test_34_a_stadium_around_a_teapot_costs_its_rays_little_anywhere(kind: Kind, distance: float) -> None:
+    ball = closed_meshes.moved(icosphere(5), 0.01)
+    around = soup(5000, 0.01, seed=34)[0] * np.float32(500)
+    # Far away the ball has the digits of its place: it is what they leave of it.
+    shift = np.float32([distance, 0.0, 0.0])
+    many = separate(np.concatenate([ball[0][ball[1]], around.reshape(-1, 3, 3)]) + shift)
+    alone = separate(ball[0][ball[1]] + shift)
+    rng = np.random.default_rng(34)
+    eye = np.float32([0.03, 0, 0])
+    rays = rows(np.tile(eye + shift, (500, 1)), closed_meshes.targets(ball, rng, 500, 3) - eye)
+    assert work(many, kind, rays) <= 3.0 * max(work(alone, kind, rays), 2.0)

@@ -1,0 +1,48 @@
+"""docs/numerics.md names the tests of every hard case, and they exist."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "numerics.md"
+COUNT = 65  # of the list of hard cases
+# | 9 | closed room, primary | `tests/hard_cases/test_geometry.py::test_09_...` (bound) |
+ROW = re.compile(r"^\| (\d+) \| ([^|]+) \| (.+) \|$")
+TEST = re.compile(r"`([\w/]+\.py)::(\w+)`")
+
+
+def rows() -> dict[int, str]:
+    """Number of the case -> what is said of its tests."""
+    found = [ROW.match(line) for line in PAGE.read_text(encoding="utf-8").splitlines()]
+    return {int(row[1]): row[3] for row in found if row}
+
+
+@cache
+def named_in(path: str) -> set[str]:
+    tree = ast.parse((ROOT / "tests" / path).read_text(encoding="utf-8"))
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")}
+
+
+def test_every_hard_case_names_its_tests() -> None:
+    named = rows()
+    assert sorted(named) == list(range(1, COUNT + 1))
+    bare = [number for number, said in named.items() if not TEST.search(said) and "build.py" not in said]
+    assert not bare, f"cases without a test: {bare}"
+
+
+def test_every_test_that_is_named_exists() -> None:
+    missing = [f"{path}::{name}" for said in rows().values() for path, name in TEST.findall(said)
+               if not (ROOT / "tests" / path).is_file() or name not in named_in(path)]  # fmt: skip
+    assert not missing
+
+
+def test_every_test_with_a_number_is_named() -> None:
+    said = rows()
+    for path in (ROOT / "tests" / "hard_cases").glob("test_*.py"):
+        for name in named_in(f"hard_cases/{path.name}"):
+            for number in re.findall(r"(?<=_)\d\d(?=_)", name):
+                assert name in said[int(number)], f"docs/numerics.md, case {int(number)}: {name} is not named"
