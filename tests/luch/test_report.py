@@ -254,7 +254,9 @@ def test_a_report_that_is_cancelled_late_keeps_what_it_found() -> None:
 def test_a_report_keeps_to_its_time_and_names_what_did_not_fit() -> None:
     began = time.perf_counter()
     report, _ = make_report(everything(), 1.5)
-    assert time.perf_counter() - began < 2 * 1.5  # it ends in a second and a half where the machine has nothing else to do
+    assert (
+        time.perf_counter() - began < 2 * 1.5
+    )  # it ends in a second and a half where the machine has nothing else to do
     assert "denoised" in report.unmeasured
     assert any("There was no time" in sentence for sentence in report.sentences)
 

@@ -46,21 +46,21 @@ struct InstanceView {
     u32 mesh, object;
     u32 first_material;  // materials = material_table[first_material + slot]
     u32 material_count;
-    u32 visibility;      // RayKind bits
-    u32 flags;           // InstanceFlag
+    u32 visibility;  // RayKind bits
+    u32 flags;  // InstanceFlag
     float random;
-    Vec3 generated;      // of the instancer
+    Vec3 generated;  // of the instancer
     Vec2 uv;
 };
 
 struct ObjectView {
-    u32 first_attribute; // attributes[first_attribute + attribute id], 4 channels; NONE: no values of its own
+    u32 first_attribute;  // attributes[first_attribute + attribute id], 4 channels; NONE: no values of its own
     float pass_index;
     float color[4];
-    Vec3 location;       // world
-    u32 lightgroup;      // bit index + 1, 0: none
+    Vec3 location;  // world
+    u32 lightgroup;  // bit index + 1, 0: none
     float crypto_object, crypto_asset;
-    float shadow_terminator; // cosine from which on shadow rays leave the curved surface; 0: never
+    float shadow_terminator;  // cosine from which on shadow rays leave the curved surface; 0: never
 };
 
 struct MaterialView {
@@ -69,8 +69,8 @@ struct MaterialView {
     float crypto;
     u32 emission_sampling;  // 0 none, 1 front, 2 back, 3 both
     u32 transparent_shadows;
-    u32 medium;             // what fills the space behind it; NONE: nothing
-    u32 only_volume;        // 1: there is no surface, only the border of its medium
+    u32 medium;  // what fills the space behind it; NONE: nothing
+    u32 only_volume;  // 1: there is no surface, only the border of its medium
 };
 
 enum class PixelFormat : u8 { U8, F16, F32 };
@@ -80,11 +80,11 @@ inline constexpr u32 IMAGE_TILE = 8;  // texels along a side of those that lie t
 struct ImageView {
     const void* pixels;  // rows bottom first; of tiles, if tiles_across is not 0
     u32 width, height;
-    u8 channels;         // 1..4
+    u8 channels;  // 1..4
     PixelFormat format;
-    u8 srgb;             // decode on lookup
-    u8 alpha;            // 0 straight, 1 premultiplied, 2 channel packed, 3 none
-    u32 tiles_across;    // 0: the texels lie row by row; else by tiles of IMAGE_TILE x IMAGE_TILE, each row by row
+    u8 srgb;  // decode on lookup
+    u8 alpha;  // 0 straight, 1 premultiplied, 2 channel packed, 3 none
+    u32 tiles_across;  // 0: the texels lie row by row; else by tiles of IMAGE_TILE x IMAGE_TILE, each row by row
 };
 
 struct LightsView;  // light/light.h
@@ -93,14 +93,14 @@ struct CameraView;  // camera/camera.h
 enum SceneFlag : u32 { SCENE_NO_REFLECTIVE_CAUSTICS = 1u, SCENE_NO_REFRACTIVE_CAUSTICS = 2u };
 
 struct SceneView {
-    const float* positions;      // 3 per vertex, object space
-    const u32* triangles;        // 3 per triangle, local vertex indices
-    const u16* material_slots;   // per triangle; spheres show the first slot
-    const float* spheres;        // 4 per sphere: centre, radius (see Sphere), object space
-    const float* curve_points;   // 4 per point of curves: place, radius, object space
-    const u32* curve_segments;   // as CurveSet's, points counted within the mesh
-    const u32* segment_curves;   // per segment: its curve, counted within the mesh
-    const u16* curve_slots;      // per curve
+    const float* positions;  // 3 per vertex, object space
+    const u32* triangles;  // 3 per triangle, local vertex indices
+    const u16* material_slots;  // per triangle; spheres show the first slot
+    const float* spheres;  // 4 per sphere: centre, radius (see Sphere), object space
+    const float* curve_points;  // 4 per point of curves: place, radius, object space
+    const u32* curve_segments;  // as CurveSet's, points counted within the mesh
+    const u32* segment_curves;  // per segment: its curve, counted within the mesh
+    const u16* curve_slots;  // per curve
     const float* normals;
     const float* attribute_data;
     const AttributeView* attributes;
@@ -111,23 +111,23 @@ struct SceneView {
     const MaterialView* materials;
     const ImageView* images;
     const Instruction* instructions;
-    const u32* operands;         // outputs, inputs, params of every instruction
+    const u32* operands;  // outputs, inputs, params of every instruction
     const float* constants;
     const float* tables;
-    const u32* program_images;      // image slot of a program -> image index
+    const u32* program_images;  // image slot of a program -> image index
     const u32* program_attributes;  // attribute slot of a program -> attribute id
-    const u32* program_aovs;        // AOV slot of a program -> AOV index of the film, NONE: not kept
+    const u32* program_aovs;  // AOV slot of a program -> AOV index of the film, NONE: not kept
     const LightsView* lights;
     u32 mesh_count, instance_count, object_count, material_count, image_count, light_count;
     u32 uv_attribute, color_attribute, generated_attribute, tangent_attribute;  // ids of the defaults
     Program world_program;
-    u32 flags;                   // SceneFlag
-    const CameraView* camera;    // Texture Coordinate > Camera/Window, Camera Data; null: they give 0
-    Vec2 frame_size;             // pixels of the full frame: Texture Coordinate > Window
-    Vec3 origin;                 // Scene.origin: added to a position it gives Blender's world
-    CurveShape curve_shape;      // of all curves
-    u32 log2_pieces;             // of every segment: see CurveSet
-    const MotionView* motion;    // null: nothing moves
+    u32 flags;  // SceneFlag
+    const CameraView* camera;  // Texture Coordinate > Camera/Window, Camera Data; null: they give 0
+    Vec2 frame_size;  // pixels of the full frame: Texture Coordinate > Window
+    Vec3 origin;  // Scene.origin: added to a position it gives Blender's world
+    CurveShape curve_shape;  // of all curves
+    u32 log2_pieces;  // of every segment: see CurveSet
+    const MotionView* motion;  // null: nothing moves
 };
 
 // Row `row` of an array of vectors.
