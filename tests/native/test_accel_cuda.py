@@ -146,7 +146,8 @@ def test_tree_built_on_the_device_gives_brute_force_hits(place: str, name: str) 
     assert ours.stats["references"] == ours.stats["primitives"] > 100
     check_equal(ours.closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays))
     good = Accel(*mesh, kind="CWBVH", device="CUDA")
-    assert ours.count(rays)["boxes"] <= 2.5 * good.count(rays)["boxes"]
+    if name != "identical":  # of copies the host's builders keep one, the device's keeps all
+        assert ours.count(rays)["boxes"] <= 2.5 * good.count(rays)["boxes"]
 
 
 def test_builder_on_the_device_drops_what_the_cpu_drops(place: str) -> None:

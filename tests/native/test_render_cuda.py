@@ -81,7 +81,9 @@ def test_the_render_time_adds_up_to_the_time_of_tracing_and_changes_no_other_pas
     """On fibers one clock, which all threads share, stands for each one's."""
     scene = replace(plain(), settings=replace(plain().settings, device="CUDA"))
     without = render(scene)
-    timed = render(replace(scene, film=replace(scene.film, passes=["Combined", "Render Time"])))
+    asking = replace(scene, film=replace(scene.film, passes=["Combined", "Render Time"]))
+    render(asking)  # on a GPU kernels with clocks are compiled when they are first used, within the time of tracing
+    timed = render(asking)
     assert timed.stats["kernel_plan"]["TIME"] and not without.stats["kernel_plan"]["TIME"]
     assert np.array_equal(without.passes["Combined"], timed.passes["Combined"])
     milliseconds = timed.passes["Render Time"][..., 0]
