@@ -10,6 +10,7 @@ import pytest
 from luch import core
 from luch.scene import Camera, Film
 from numpy.typing import NDArray
+from support.blender import save_every_pass
 
 bpy = pytest.importorskip("bpy")
 oiio = pytest.importorskip("OpenImageIO")
@@ -42,9 +43,7 @@ def scene() -> Any:
     scene.render.threads_mode = "FIXED"
     scene.render.threads = 1
     scene.view_layers[0].use_pass_position = True
-    scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
-    scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
-    scene.render.image_settings.color_depth = "32"
+    save_every_pass(scene)
     return scene
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import OpenImageIO as oiio
+from support.blender import save_every_pass
 
 
 def test_pixels_and_manifest_agree_with_cycles(
@@ -62,9 +63,7 @@ def test_the_manifest_names_the_bits_of_the_pixels(scene: bpy.types.Scene, tmp_p
     render.engine = "LUCH"
     render.resolution_x = render.resolution_y = 4
     scene.luch.samples = 1
-    render.image_settings.media_type = "MULTI_LAYER_IMAGE"
-    render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
-    render.image_settings.color_depth = "32"
+    save_every_pass(scene)
     render.filepath = str(tmp_path / "matte.exr")
     bpy.ops.render.render(write_still=True)
     file = oiio.ImageInput.open(render.filepath)

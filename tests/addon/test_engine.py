@@ -14,11 +14,10 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from luch.scene import Scene
+from support.blender import save_every_pass
 from support.pictures import read_passes
 
 from addon import engine, report, result
-
-MULTILAYER = "OPEN_EXR_MULTILAYER"
 
 
 @pytest.fixture
@@ -32,9 +31,7 @@ def room(scene: bpy.types.Scene, tmp_path: Path) -> bpy.types.Scene:
     render = scene.render
     render.engine = "LUCH"
     render.resolution_x, render.resolution_y, render.resolution_percentage = 16, 12, 100
-    render.image_settings.media_type = "MULTI_LAYER_IMAGE"
-    render.image_settings.file_format = MULTILAYER
-    render.image_settings.color_depth = "32"
+    save_every_pass(scene)
     render.filepath = str(tmp_path / "frame.exr")
     render.use_file_extension = False
     scene.luch.samples = 1

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from luch.cli import main
 from luch.merge import read_sums
+from support.blender import save_every_pass
 from support.pictures import read_passes
 
 from addon.command_line import CommandLineError, overrides
@@ -23,8 +24,7 @@ def lit(scene: bpy.types.Scene) -> bpy.types.Scene:
     render = scene.render
     render.engine = "LUCH"
     render.resolution_x, render.resolution_y, render.resolution_percentage = 16, 12, 100
-    render.image_settings.media_type = "MULTI_LAYER_IMAGE"
-    render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    save_every_pass(scene)
     render.use_file_extension = False
     return scene
 

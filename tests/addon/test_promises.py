@@ -18,6 +18,7 @@ from luch.cuda import device as cuda_device
 from luch.render import render as render_scene
 from luch.scene import Scene
 from numpy.typing import NDArray
+from support.blender import save_every_pass
 from support.pictures import read_passes
 
 import addon
@@ -50,9 +51,7 @@ def prepare(scene: bpy.types.Scene, folder: Path, size: int = 16) -> None:
     render = scene.render
     render.engine = "LUCH"
     render.resolution_x, render.resolution_y, render.resolution_percentage = size, size, 100
-    render.image_settings.media_type = "MULTI_LAYER_IMAGE"
-    render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
-    render.image_settings.color_depth = "32"
+    save_every_pass(scene)
     render.filepath = str(folder / f"{scene.name}.exr")
     render.use_file_extension = False
     scene.luch.samples = 1

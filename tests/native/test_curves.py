@@ -10,7 +10,7 @@ from luch.accel import KINDS
 from luch.render import Result, render
 from luch.scene import Attribute, Scene
 from luch.shader import ProgramBuilder
-from support.accel_meshes import icosphere
+from support.from_above import add_ball, three_places
 from support.hair import clear_fibre, fur, scene_of, strands, white
 
 SHAPES = ("RIBBON", "THICK", "THICK_LINEAR")
@@ -25,15 +25,9 @@ def rendered(scene: Scene) -> Result:
 
 def mixed(shape: str) -> Scene:
     """A lumpy ball of triangles among 200 strands, drawn thrice: as it is, stretched, and mirrored."""
-    positions, triangles = icosphere(2)
     mesh = fur(200)
-    mesh.positions, mesh.triangles = positions * np.float32(0.7), triangles
-    mesh.material_slots = np.zeros(len(triangles), np.uint16)
-    matrices = np.stack([np.eye(3, 4)] * 3)
-    matrices[1, :, :3] = [[2.0, 0.3, 0.0], [0.0, 0.5, 0.0], [0.1, 0.0, 1.0]]
-    matrices[2, :, :3] = np.diag([-0.4, 1.1, 0.8])
-    matrices[:, 0, 3] = 0.0, 2.5, -2.5
-    scene = scene_of(mesh, clear_fibre, shape=shape, width=8.0, matrices=matrices, world=1.0)
+    add_ball(mesh)
+    scene = scene_of(mesh, clear_fibre, shape=shape, width=8.0, matrices=three_places(), world=1.0)
     scene.settings.samples = 2
     return scene
 
@@ -68,21 +62,27 @@ def test_other_precisions_see_the_same_hair(precision: str, truth: dict[str, Any
     assert np.isclose(ours[hit], exact[hit], rtol=1e-4).mean() > 0.97
 
 
+def straight(shape: str, away: float, scale: float) -> tuple[dict[str, Any], Any, Any, float]:
+    """A straight strand, a quarter thick: passes, the pixels that show it, their places in its own measure, and what
+    rounding may be off in that.
+    """
+    rows = [[away + x * scale, away, 0.0, 0.25 * scale] for x in (-1.0, -0.4, 0.3, 1.0)]
+    scene = scene_of(strands(rows), shape=shape, width=3.0 * scale, above=4.0 * scale, size=48)
+    scene.camera.matrix[:2, 3] = away
+    passes = rendered(scene).passes
+    hit = np.linalg.norm(passes["Normal"], axis=2) > 0.5
+    assert hit.mean() == pytest.approx(2.0 / 3.0 * 0.5 / 3.0, rel=0.06)
+    place = (passes["Position"][hit].astype(np.float64) - [away, away, 0.0]) / scale
+    return passes, hit, place, 2.0**-24 * 1.5 * away / scale
+
+
 AWAY = [(0.0, 1.0), (0.0, 1e-4), (0.0, 1e4), (1e3, 1.0), (1e5, 100.0)]
 
 
 @pytest.mark.parametrize(("away", "scale"), AWAY)
 def test_a_straight_round_curve_is_an_open_cylinder(away: float, scale: float) -> None:
     """Diffuse white under a sun from straight above: as bright as the cosine."""
-    radius = 0.25 * scale
-    rows = [[away + x * scale, away, 0.0, radius] for x in (-1.0, -0.4, 0.3, 1.0)]
-    scene = scene_of(strands(rows), shape="THICK", width=3.0 * scale, above=4.0 * scale, size=48)
-    scene.camera.matrix[:2, 3] = away
-    passes = rendered(scene).passes
-    hit = np.linalg.norm(passes["Normal"], axis=2) > 0.5
-    assert hit.mean() == pytest.approx(2.0 / 3.0 * 0.5 / 3.0, rel=0.06)
-    ulp = 2.0**-24 * 1.5 * away / scale
-    place = (passes["Position"][hit].astype(np.float64) - [away, away, 0.0]) / scale
+    passes, hit, place, ulp = straight("THICK", away, scale)
     assert np.abs(np.hypot(place[:, 1], place[:, 2]) - 0.25).max() < 1e-4 + 4.0 * ulp
     normal = passes["Normal"][hit].astype(np.float64)
     assert np.abs(normal[:, 1:] - place[:, 1:] / 0.25).max() < 2e-3 + 32.0 * ulp
@@ -92,15 +92,7 @@ def test_a_straight_round_curve_is_an_open_cylinder(away: float, scale: float) -
 
 @pytest.mark.parametrize(("away", "scale"), AWAY)
 def test_a_straight_ribbon_is_a_rectangle_shaded_as_if_round(away: float, scale: float) -> None:
-    radius = 0.25 * scale
-    rows = [[away + x * scale, away, 0.0, radius] for x in (-1.0, -0.4, 0.3, 1.0)]
-    scene = scene_of(strands(rows), width=3.0 * scale, above=4.0 * scale, size=48)
-    scene.camera.matrix[:2, 3] = away
-    passes = rendered(scene).passes
-    hit = np.linalg.norm(passes["Normal"], axis=2) > 0.5
-    assert hit.mean() == pytest.approx(2.0 / 3.0 * 0.5 / 3.0, rel=0.06)
-    ulp = 2.0**-24 * 1.5 * away / scale
-    place = (passes["Position"][hit].astype(np.float64) - [away, away, 0.0]) / scale
+    passes, hit, place, ulp = straight("RIBBON", away, scale)
     assert np.abs(place[:, 2]).max() < 1e-5 + 4.0 * ulp, "flat"
     normal = passes["Normal"][hit].astype(np.float64)
     assert np.abs(normal[:, 1] - place[:, 1] / 0.25).max() < 1e-4 + 32.0 * ulp

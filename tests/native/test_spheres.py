@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from luch.accel import KINDS, PRECISIONS, QUALITIES, Accel, Kind
 from luch.render import Result, render
-from luch.scene import Attribute, Camera, Film, Instances, Light, Material, Mesh, Object, Scene, Settings, World
+from luch.scene import Attribute, Material, Mesh, Object, Scene
 from luch.shader import ProgramBuilder
 from numpy.typing import NDArray
 from support.accel_meshes import icosphere, random_rays
 from support.effects import closure, program
+from support.from_above import Build, add_ball, scene_of, three_places, white
 
 F32 = NDArray[np.float32]
 SIZE = 24
-PASSES = ["Combined", "Depth", "Normal", "Position"]
-Build = Callable[[ProgramBuilder], None]
-
-
-def white(builder: ProgramBuilder) -> None:
-    closure(builder, "CLOSURE_DIFFUSE", {"color": (1.0, 1.0, 1.0)})
 
 
 def mirror_glass(builder: ProgramBuilder) -> None:
@@ -50,40 +44,6 @@ def balls(*rows: tuple[float, float, float, float]) -> Mesh:
     return Mesh("Dust", none, none.astype(np.uint32), np.zeros(0, np.uint16), spheres=np.array(rows, np.float32))
 
 
-def scene_of(
-    mesh: Mesh,
-    build: Build = white,
-    *,
-    width: float = 3.0,
-    above: float = 10.0,
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    matrices: NDArray[np.float64] | None = None,
-    world: float = 0.0,
-) -> Scene:
-    """Seen from above by an orthographic camera, lit by a sun that shines straight down."""
-    eye = np.eye(3, 4)
-    eye[:, 3] = at[0], at[1], at[2] + above
-    placed = np.eye(3, 4)[None] if matrices is None else matrices
-    count = len(placed)
-    instances = Instances(
-        np.zeros(count, np.uint32), placed, np.zeros(count, np.float32),
-        np.zeros((count, 3), np.float32), np.zeros((count, 2), np.float32),
-    )  # fmt: skip
-    sky = ProgramBuilder()
-    sky.closure("CLOSURE_EMISSION", sky.vector(world, world, world))
-    return Scene(
-        meshes=[mesh],
-        objects=[Object(mesh.name, 0, [0])],
-        instances=instances,
-        materials=[Material("Matter", program(build))],
-        lights=[] if world else [Light("Sun", "SUN", power=np.pi)],
-        world=World("World", sky.finish()) if world else None,
-        camera=Camera(kind="ORTHO", ortho_scale=width, clip_start=above * 1e-4, clip_end=above * 1e4, matrix=eye),
-        film=Film(width=SIZE, height=SIZE, passes=PASSES),
-        settings=Settings(samples=1, threads=1, accelerator="BVH", max_bounces=8, estimate_error=False),
-    )
-
-
 def rendered(scene: Scene) -> Result:
     result = render(scene)
     assert result.stats["non_finite_samples"] == 0
@@ -93,15 +53,9 @@ def rendered(scene: Scene) -> Result:
 def mixed() -> Scene:
     """A lumpy ball of triangles among 700 spheres, drawn thrice: as it is, stretched, and mirrored."""
     rng = np.random.default_rng(3)
-    positions, triangles = icosphere(2)
     mesh = balls(*np.concatenate([rng.uniform(-1.5, 1.5, (700, 3)), rng.exponential(0.05, (700, 1))], 1).tolist())
-    mesh.positions, mesh.triangles = positions * np.float32(0.7), triangles
-    mesh.material_slots = np.zeros(len(triangles), np.uint16)
-    matrices = np.stack([np.eye(3, 4)] * 3)
-    matrices[1, :, :3] = [[2.0, 0.3, 0.0], [0.0, 0.5, 0.0], [0.1, 0.0, 1.0]]
-    matrices[2, :, :3] = np.diag([-0.4, 1.1, 0.8])
-    matrices[:, 0, 3] = 0.0, 2.5, -2.5
-    scene = scene_of(mesh, mirror_glass, width=8.0, matrices=matrices, world=1.0)
+    add_ball(mesh)
+    scene = scene_of(mesh, mirror_glass, width=8.0, matrices=three_places(), world=1.0)
     scene.settings.samples = 4
     return scene
 

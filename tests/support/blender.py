@@ -34,6 +34,14 @@ def set_plain_cycles(scene: bpy.types.Scene, samples: int, seed: int) -> None:
     cycles.time_limit = 0.0
 
 
+def save_every_pass(scene: bpy.types.Scene) -> None:
+    """Frames become multilayer EXR of floats."""
+    settings = scene.render.image_settings
+    settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth = "32"
+
+
 def render_passes(
     engine: str, folder: Path, *, width: int = 32, height: int = 32, samples: int = 16, seed: int = 0
 ) -> dict[str, F32]:
@@ -50,11 +58,8 @@ def render_passes(
     set_plain_cycles(scene, samples, seed)
     if engine == "LUCH":
         scene.luch.samples, scene.luch.seed = samples, seed
-    settings = render.image_settings
-    settings.media_type = "MULTI_LAYER_IMAGE"
-    settings.file_format = "OPEN_EXR_MULTILAYER"
-    settings.color_depth = "32"
-    settings.exr_codec = "ZIP"
+    save_every_pass(scene)
+    render.image_settings.exr_codec = "ZIP"
     path = folder / f"{engine.lower()}-{os.getpid()}.exr"
     render.filepath = str(path)
     render.use_file_extension = False

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from luch.scene import Camera, Curves, Film, Instances, Light, Material, Mesh, Object, Scene, Settings, World
+from luch.scene import Curves, Mesh, Scene
 from luch.shader import ProgramBuilder
 
-from support.effects import closure, program
+from support import from_above
+from support.effects import closure
+from support.from_above import Build, white
 
-Build = Callable[[ProgramBuilder], None]
 FIBRE: dict[str, object] = {
     "absorption": (0.1, 0.3, 0.6), "roughness": 0.3, "radial_roughness": 0.3, "ior": 1.55, "offset": 0.0349,
     "random": 0.5,
 }  # fmt: skip
-
-
-def white(builder: ProgramBuilder) -> None:
-    closure(builder, "CLOSURE_DIFFUSE", {"color": (1.0, 1.0, 1.0)})
 
 
 def fibre(builder: ProgramBuilder) -> None:
@@ -54,39 +51,9 @@ def fur(count: int, seed: int = 3, radius: float = 0.03, points: int = 5) -> Mes
     return strands(*rows.tolist())
 
 
-def scene_of(
-    mesh: Mesh,
-    build: Build = white,
-    *,
-    shape: str = "RIBBON",
-    width: float = 3.0,
-    size: int = 24,
-    above: float = 10.0,
-    matrices: Any = None,
-    world: float = 0.0,
-    passes: Sequence[str] = ("Combined", "Depth", "Normal", "Position"),
-) -> Scene:
-    """Seen from above by an orthographic camera, lit by a sun that shines straight down or by an even world."""
-    eye = np.eye(3, 4)
-    eye[2, 3] = above
-    placed = np.eye(3, 4)[None] if matrices is None else matrices
-    count = len(placed)
-    instances = Instances(
-        np.zeros(count, np.uint32), placed, np.zeros(count, np.float32),
-        np.zeros((count, 3), np.float32), np.zeros((count, 2), np.float32),
-    )  # fmt: skip
-    sky = ProgramBuilder()
-    sky.closure("CLOSURE_EMISSION", sky.vector(world, world, world))
-    return Scene(
-        meshes=[mesh],
-        objects=[Object(mesh.name, 0, [0])],
-        instances=instances,
-        materials=[Material("Hair", program(build))],
-        lights=[] if world else [Light("Sun", "SUN", power=np.pi)],
-        world=World("World", sky.finish()) if world else None,
-        camera=Camera(kind="ORTHO", ortho_scale=width, clip_start=above * 1e-4, clip_end=above * 1e4, matrix=eye),
-        film=Film(width=size, height=size, passes=list(passes), filter="BOX", filter_width=1e-3),
-        settings=Settings(
-            samples=1, threads=1, accelerator="BVH", max_bounces=8, estimate_error=False, curve_shape=shape
-        ),
-    )
+def scene_of(mesh: Mesh, build: Build = white, *, shape: str = "RIBBON", **view: Any) -> Scene:
+    """As support.from_above has it, each pixel seen at its centre."""
+    scene = from_above.scene_of(mesh, build, **view)
+    scene.film.filter, scene.film.filter_width = "BOX", 1e-3
+    scene.settings.curve_shape = shape
+    return scene
