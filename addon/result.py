@@ -21,8 +21,7 @@ class ResultWriter:
     def __init__(self, engine: Any, layer: str, film: Film) -> None:
         self._engine = engine
         self._layer = layer
-        x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
-        self._size = (x1 - x0, y1 - y0)
+        self._size = film.size
         self._result: Any = None
 
     def __enter__(self) -> ResultWriter:

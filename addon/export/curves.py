@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .attributes import TYPES, read
 from .context import ExportContext
+from .places import read_places
 
 DEFAULT_RADIUS = 0.005  # metres, of curves without the attribute
 SURFACE_UV = "surface_uv_coordinate"  # where on the surface that it grows from a curve has its root
@@ -40,12 +41,7 @@ def export_curves(data: Any, wanted: set[str], context: ExportContext) -> Mesh |
 
 def read_points(data: Any, context: ExportContext) -> F32:
     """Place and radius of every point, (P, 4); those that are not finite have none and are named."""
-    count = len(data.points)
-    points = np.empty((count, 4), np.float32)
-    points[:, :3] = read(data.attributes["position"].data, "vector", 3 * count, np.float32).reshape(-1, 3)
-    points[:, 3] = _radii(data, count, context)
-    _shrink_invalid(points, data.name, context)
-    return points
+    return read_places(data, f'Curves "{data.name}"', DEFAULT_RADIUS, "drawn without a radius", context)
 
 
 def mesh_of(name: str, curves: Curves) -> Mesh:
@@ -115,32 +111,6 @@ def _mixed(word: NDArray[np.uint32], by: NDArray[np.uint32], bits: int) -> NDArr
     turned = (by << np.uint32(bits)) | (by >> np.uint32(32 - bits))
     result: NDArray[np.uint32] = (word ^ by) - turned
     return result
-
-
-def _radii(data: Any, count: int, context: ExportContext) -> F32:
-    layer = data.attributes.get("radius")
-    kind = TYPES.get(layer.data_type) if layer is not None and layer.domain == "POINT" else None
-    if kind is None or kind[1] != 1:
-        if layer is not None:
-            context.warn(
-                f'Curves "{data.name}": the attribute "radius" is not a number per point ({layer.data_type} per'
-                f" {layer.domain.lower()}), so every radius is {DEFAULT_RADIUS} m. Convert it with Attribute > Convert."
-            )
-        return np.full(count, DEFAULT_RADIUS, np.float32)
-    value, _, dtype = kind
-    return read(layer.data, value, count, dtype).astype(np.float32)
-
-
-def _shrink_invalid(points: F32, name: str, context: ExportContext) -> None:
-    """Points that are not finite go where none is seen, with radius 0: curves keep their numbers."""
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
-        context.warn(
-            f'Curves "{name}": point {int(np.argmin(finite))} is not finite; {int((~finite).sum())} such points'
-            " are drawn without a radius. Remove them with Delete Geometry in geometry nodes."
-        )
-        points[~finite] = 0.0
-    np.maximum(points[:, 3], 0.0, out=points[:, 3])
 
 
 def _attributes(data: Any, wanted: set[str], context: ExportContext) -> dict[str, Attribute]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from luch.scene import F32, Attribute, Mesh
+from luch.scene import Attribute, Mesh
 
 from .attributes import TYPES, read
 from .context import ExportContext
+from .places import read_places
 
 DEFAULT_RADIUS = 0.01  # metres, of a cloud without the attribute
 # Cycles keeps it for itself: an Attribute node reads 0, Point Info tells it.
@@ -23,10 +24,8 @@ def export_points(cloud: Any, wanted: set[str], context: ExportContext) -> Mesh 
     count = len(cloud.points)
     if count == 0:
         return None
-    spheres = np.empty((count, 4), np.float32)
-    spheres[:, :3] = read(cloud.attributes["position"].data, "vector", 3 * count, np.float32).reshape(-1, 3)
-    spheres[:, 3] = _radii(cloud, count, context)
-    _shrink_invalid(spheres, cloud.name, context)
+    # Left out where it lies: Point Info > Random counts it.
+    spheres = read_places(cloud, f'Point cloud "{cloud.name}"', DEFAULT_RADIUS, "left out", context)
     none = np.zeros((0, 3), np.float32)
     return Mesh(
         name=cloud.name,
@@ -39,32 +38,6 @@ def export_points(cloud: Any, wanted: set[str], context: ExportContext) -> Mesh 
         texture_location=(0.5, 0.5, 0.5),
         texture_size=(0.5, 0.5, 0.5),
     )
-
-
-def _radii(cloud: Any, count: int, context: ExportContext) -> F32:
-    layer = cloud.attributes.get("radius")
-    kind = TYPES.get(layer.data_type) if layer is not None and layer.domain == "POINT" else None
-    if kind is None or kind[1] != 1:
-        if layer is not None:
-            context.warn(
-                f'Point cloud "{cloud.name}": the attribute "radius" is not a number per point ({layer.data_type}), so'
-                f" every radius is {DEFAULT_RADIUS} m. Convert it with Attribute > Convert."
-            )
-        return np.full(count, DEFAULT_RADIUS, np.float32)
-    value, _, dtype = kind
-    return read(layer.data, value, count, dtype).astype(np.float32)
-
-
-def _shrink_invalid(spheres: F32, name: str, context: ExportContext) -> None:
-    """Points that cannot be drawn keep their place, which Point Info > Random counts, with radius 0."""
-    finite = np.isfinite(spheres).all(axis=1)
-    if not finite.all():
-        context.warn(
-            f'Point cloud "{name}": point {int(np.argmin(finite))} is not finite; {int((~finite).sum())} such points'
-            " are left out. Remove them with Delete Geometry in geometry nodes."
-        )
-        spheres[~finite] = 0.0
-    np.maximum(spheres[:, 3], 0.0, out=spheres[:, 3])  # below zero Cycles draws nothing
 
 
 def _attributes(cloud: Any, wanted: set[str], count: int, context: ExportContext) -> dict[str, Attribute]:

@@ -137,8 +137,8 @@ def _stepped(samples: F64) -> F64:
 
 def regions_of(film: Film) -> Regions:
     """Of the rendered part of a picture."""
-    x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
-    return Regions(y1 - y0, x1 - x0)
+    width, height = film.size
+    return Regions(height, width)
 
 
 class Adaptive:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from luch.effects.programs import decode
+from luch.effects.programs import TILED, decode
 from luch.scene import Film, Instances, Object, Program, Scene, Settings
 from luch.shader_code import ATTRIBUTE_UV, Node
 
@@ -25,7 +25,6 @@ MOST_SAMPLES = 1 << 31
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 # Of all meshes together. A structure counts primitives in 30 bits, views count rows and numbers in 32.
 _MOST = {"primitives": (1 << 30) - 1, "vertices": (1 << 32) // 3, "numbers of attributes": (1 << 32) - 1}
-_TILED = 2  # ImageFlag of shade/textures/image_nodes.h
 _SKY_ROWS, _SKY_COLUMNS = 256, 256  # SkyAtmosphere of shade/textures/sky.h: half the circle
 _AGAIN = "Export the scene again."
 
@@ -181,7 +180,7 @@ def _fault_of(node: Node, program: Program) -> str:
 
 def _fault_of_images(name: str, words: tuple[int, ...], count: int) -> str:
     slots = [words[0]]
-    if name == "IMAGE" and words[4] & _TILED:
+    if name == "IMAGE" and words[4] & TILED:
         if 5 + 2 * words[0] > len(words):
             return f"has {words[0]} tiles in {len(words)} static words"
         slots = [words[6 + 2 * k] for k in range(words[0])]

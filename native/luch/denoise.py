@@ -134,9 +134,8 @@ def rendered(scene: Scene, render: Render, progress: Watch | None) -> Result:
     traced = replace(scene, settings=replace(settings, denoise=False))
     try:
         library()
-        x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
         if settings.time_limit > 0.0:
-            traced.settings.time_limit = max(1e-3, settings.time_limit - seconds_for((x1 - x0) * (y1 - y0)))
+            traced.settings.time_limit = max(1e-3, settings.time_limit - seconds_for(film.pixels))
         traced = replace(traced, film=replace(film, passes=[*film.passes, *guides]))
         result = render(traced, progress=progress)
         began = time.perf_counter()

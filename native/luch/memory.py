@@ -84,8 +84,7 @@ def _arrays(scene: Scene) -> Iterator[np.ndarray[Any, Any]]:
 
 def film_bytes(film: Film, pixel_bytes: float = LEAST_PIXEL_BYTES) -> float:
     """Of the rendered region."""
-    x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
-    return float(x1 - x0) * float(y1 - y0) * pixel_bytes
+    return float(film.pixels) * pixel_bytes
 
 
 def require(scene: Scene, pixel_bytes: float = LEAST_PIXEL_BYTES) -> None:

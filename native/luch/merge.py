@@ -69,8 +69,7 @@ class Sums:
 
     def layers(self) -> dict[str, F32]:
         """As images of a file, beside the passes."""
-        x0, y0, x1, y1 = self.film.border or (0, 0, self.film.width, self.film.height)
-        shape = y1 - y0, x1 - x0
+        shape = self.film.size[::-1]
         counts = np.stack([self.counts // HALF_WORD, self.counts % HALF_WORD], axis=-1)
         layers = {COUNT_LAYER: counts.reshape(*shape, 2).astype(np.float32)}
         for channel in range(self.rows.shape[1]):

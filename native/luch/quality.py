@@ -21,7 +21,6 @@ from luch.report.plan import EXACT, Variant, exact_settings
 from luch.report.results import Report, Row
 from luch.report.schedule import Cancelled, Session, Told
 from luch.report.sentences import duration
-from luch.report.shots import size_of
 from luch.scene import Scene
 from luch.stopping import CUSTOM, STEPS, UNLIMITED_SAMPLES
 
@@ -171,7 +170,7 @@ def _read(path: str, scene: Scene) -> Report:
         report = files.read(Path(path))
     except (OSError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: cannot be read as a report ({error}). Make it again.") from error
-    width, height = size_of(scene.film)
+    width, height = scene.film.size
     return replace(report, full_width=width, full_height=height)
 
 

@@ -89,12 +89,6 @@ def _next_count(done: int, next_look: int, seconds: float) -> int:
     return max(1, min(done, by_time, next_look - done))
 
 
-def film_pixels(film: Film) -> int:
-    """Pixels of the rendered region."""
-    x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
-    return (x1 - x0) * (y1 - y0)
-
-
 def _adaptive_for(film: Film, settings: Settings) -> Adaptive | None:
     """Only on the way to an error; merged pictures must have the same samples everywhere."""
     if not (settings.adaptive and settings.error_limit > 0.0) or settings.mergeable:
@@ -135,7 +129,7 @@ class _Loop:
         self.adaptive = _adaptive_for(scene.film, settings)
         self.prepared = start
         self.cancelled = self.timed_out = False
-        pixels = film_pixels(scene.film)
+        pixels = scene.film.pixels
         self._look_cost = LOOK_SECONDS * pixels / max(1, os.cpu_count() or 1) if settings.estimate_error else 0.0
         # Of this thread alone: what other work on the machine adds to the wall's clock must not put off the next look.
         self._look_busy = self._look_cost

@@ -269,6 +269,18 @@ class Film:
     lightgroups: list[str] = field(default_factory=list)
     aovs: list[tuple[str, str]] = field(default_factory=list)  # (name, "COLOR" or "VALUE")
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Pixels that are rendered, across and up: of the border, if there is one."""
+        x0, y0, x1, y1 = self.border or (0, 0, self.width, self.height)
+        return x1 - x0, y1 - y0
+
+    @property
+    def pixels(self) -> int:
+        """How many are rendered."""
+        width, height = self.size
+        return width * height
+
 
 @dataclass
 class Settings:

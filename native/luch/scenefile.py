@@ -32,8 +32,8 @@ FORMAT = "luch scene"
 VERSION = 2
 OLDEST = 2  # version 1 did not name the operations of its shader programs
 HEADER = "scene.json"
-# What zipfile and json raise for bytes that make no sense to them. RuntimeError: encrypted, nested too deep; OSError:
-# told to read before the beginning.
+# What zipfile and json raise for bytes that make no sense to them. NotImplementedError: packed in a way that zipfile does
+# not know; RuntimeError: encrypted, nested too deep; OSError: told to read before the beginning.
 _BROKEN_ARCHIVE = (
     zipfile.BadZipFile, zlib.error, KeyError, ValueError, EOFError, NotImplementedError, RuntimeError, OverflowError,
     OSError,

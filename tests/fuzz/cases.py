@@ -139,9 +139,8 @@ def _render_case(scene: Scene, told: str) -> str:
         raise Finding(f"{type(error).__name__}: {error} ({told})") from error
     if time.monotonic() > ends + CANCEL_S:
         raise Finding(f"took {time.monotonic() - ends + LONGEST_S:.1f} s, though cancelled after {LONGEST_S} ({told})")
-    x0, y0, x1, y1 = scene.film.border or (0, 0, scene.film.width, scene.film.height)
     for name, image in result.passes.items():
-        if image.shape[:2] != (y1 - y0, x1 - x0):
+        if image.shape[:2] != scene.film.size[::-1]:
             raise Finding(f"pass {name} has the shape {image.shape} ({told})")
         if not np.isfinite(image).all():
             raise Finding(f"pass {name} is not finite ({told})")

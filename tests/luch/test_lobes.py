@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from luch._native import core
-from luch.effects.lobes import most_lobes, needs_of
+from luch.effects.lobes import possible_in
 from luch.scene import Image, Material, Program
 from luch.shader import ProgramBuilder
 from luch.shader_code import OPS
@@ -48,7 +48,7 @@ def test_no_point_has_more_lobes_than_were_foreseen(seed: int) -> None:
                 closure(builder, "CLOSURE_DIFFUSE", {"color": ONE, "roughness": chosen(rng, "roughness")})
 
     made = program(build)
-    foreseen = most_lobes(scene(materials=[Material("Any", made)]))
+    foreseen = possible_in(scene(materials=[Material("Any", made)])).most_lobes
     assert lobes_made(made, seed) <= foreseen
 
 
@@ -59,7 +59,7 @@ def test_each_node_makes_no_more_lobes_than_were_foreseen(name: str) -> None:
         "roughness": 0.3, "alpha": 0.2,
     }  # fmt: skip
     made = program(lambda builder: closure(builder, name, inputs))
-    assert lobes_made(made, 1) <= most_lobes(scene(materials=[Material("Any", made)]))
+    assert lobes_made(made, 1) <= possible_in(scene(materials=[Material("Any", made)])).most_lobes
 
 
 @pytest.mark.parametrize(("inputs", "needs"), [
@@ -69,15 +69,15 @@ def test_each_node_makes_no_more_lobes_than_were_foreseen(name: str) -> None:
     ({"diffuse_roughness": 0.3}, {"rough diffuse"}),
 ])  # fmt: skip
 def test_principled_needs_what_its_inputs_ask_for(inputs: dict[str, object], needs: set[str]) -> None:
-    assert needs_of(scene(lambda builder: principled(builder, **inputs))) == needs
+    assert possible_in(scene(lambda builder: principled(builder, **inputs))).needs == needs
 
 
 def test_distributions_and_images_are_needed_where_they_are_chosen() -> None:
     beckmann = scene(lambda builder: closure(builder, "CLOSURE_GLOSSY", {"color": ONE}, params=(1, 1)))
-    assert needs_of(beckmann) == {"beckmann"}
+    assert possible_in(beckmann).needs == {"beckmann"}
     phong = scene(lambda builder: closure(builder, "CLOSURE_GLOSSY", {"color": ONE}, params=(1, 3)))
-    assert needs_of(phong) == {"ashikhmin shirley"}
+    assert possible_in(phong).needs == {"ashikhmin shirley"}
     bytes_ = Image("Bytes", np.zeros((2, 2, 4), np.uint8))
     floats, halves = Image("Floats", np.zeros((2, 2, 3), np.float32)), Image("Halves", np.zeros((2, 2, 3), np.float16))
-    assert needs_of(scene(images=[bytes_])) == set()
-    assert needs_of(scene(images=[bytes_, floats, halves])) == {"float images", "half images"}
+    assert possible_in(scene(images=[bytes_])).needs == set()
+    assert possible_in(scene(images=[bytes_, floats, halves])).needs == {"float images", "half images"}

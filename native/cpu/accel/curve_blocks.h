@@ -8,22 +8,14 @@
 namespace luch::cpu {
 
 template <Precision P>
-struct CurveBlockRay {
-    f8 origin[3], direction[3];  // of length near 1: squares keep their range
-    f8 inverse_a;
+struct CurveBlockRay : BlockLine {
     CurveRay<typename CurveNumber<P>::Type> exact;
     float t_min;
 
     CurveBlockRay(const LaneRay& ray, float t_min_)
-        : exact(make_curve_ray<typename CurveNumber<P>::Type>(ray.origin3(), ray.direction3())), t_min(t_min_) {
-        Vec3 o = ray.origin3(), d = ray.direction3();
-        d = d * (1.0f / max_component(abs_v(d)));
-        for (int axis = 0; axis < 3; ++axis) {
-            origin[axis] = splat<f8>(o[axis]);
-            direction[axis] = splat<f8>(d[axis]);
-        }
-        inverse_a = splat<f8>(1.0f / dot(d, d));
-    }
+        : BlockLine(ray.origin3(), ray.direction3()),
+          exact(make_curve_ray<typename CurveNumber<P>::Type>(ray.origin3(), ray.direction3())),
+          t_min(t_min_) {}
 };
 
 // Bits of the lanes whose capsules the ray's line may touch; never drops one that the test would take. The same bound
@@ -53,14 +45,13 @@ LUCH_FN u32 line_may_touch(const CurveBlock& block, const CurveBlockRay<P>& ray)
         f8 n = f[axis] + e[axis] * w;
         distance2 += n * n;
     }
-    f8 limit = load<f8>(block.radius) + reach * CAPSULE_SLACK;
-    f8 limit2 = limit * limit + 1e-43f;  // denormal squares have few digits
-    // Where a square overflowed or is NaN, the test decides.
-    return ~(mask_le(limit2, distance2) & mask_le(distance2, splat<f8>(3.402823466e+38f))) & 255u;
+    return lanes_within(distance2, load<f8>(block.radius) + reach * CAPSULE_SLACK);
 }
 
-template <Precision P, class Count>
-LUCH_FN void closest_in_leaf(const Group& group, const CurveBlockRay<P>& ray, u32 leaf, RefHit* best, Count& count) {
+// Calls act(ref, hit) for each piece that the ray meets before *t_max, which act may lower, until it says false.
+template <Precision P, class Count, class Act>
+LUCH_FN void meet_pieces(const Group& group, const CurveBlockRay<P>& ray, u32 leaf, const float* t_max, Count& count,
+                         Act&& act) {
     u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
     for (u32 b = first; b < end; ++b) {
         const CurveBlock& block = group.curve_blocks[b];
@@ -69,29 +60,27 @@ LUCH_FN void closest_in_leaf(const Group& group, const CurveBlockRay<P>& ray, u3
             u32 ref = block.ref[__builtin_ctz(mask)];
             TriangleHit hit;
             if ((ref & REF_MASK) != REF_MASK &&
-                intersect_piece(group.curves, ref & REF_MASK, ray.exact, ray.t_min, best->t, &hit))
-                offer(hit.t, ref, hit.u, hit.v, best);
+                intersect_piece(group.curves, ref & REF_MASK, ray.exact, ray.t_min, *t_max, &hit) && !act(ref, hit))
+                return;
         }
     }
+}
+
+template <Precision P, class Count>
+LUCH_FN void closest_in_leaf(const Group& group, const CurveBlockRay<P>& ray, u32 leaf, RefHit* best, Count& count) {
+    meet_pieces(group, ray, leaf, &best->t, count, [&](u32 ref, const TriangleHit& hit) {
+        offer(hit.t, ref, hit.u, hit.v, best);
+        return true;
+    });
 }
 
 template <Precision P, class Count>
 LUCH_FN void any_in_leaf(const Group& group, const CurveBlockRay<P>& ray, u32 leaf, float t_max, u8* result,
                          Count& count) {
-    u32 first = leaf_first(leaf), end = first + leaf_items(leaf);
-    for (u32 b = first; b < end; ++b) {
-        const CurveBlock& block = group.curve_blocks[b];
-        count_block(block, count);
-        for (u32 mask = line_may_touch(block, ray); mask; mask &= mask - 1) {
-            u32 ref = block.ref[__builtin_ctz(mask)];
-            TriangleHit hit;
-            if ((ref & REF_MASK) != REF_MASK &&
-                intersect_piece(group.curves, ref & REF_MASK, ray.exact, ray.t_min, t_max, &hit)) {
-                note_blocked(ref, result);
-                if (*result == BLOCKED_OPAQUE) return;
-            }
-        }
-    }
+    meet_pieces(group, ray, leaf, &t_max, count, [&](u32 ref, const TriangleHit&) {
+        note_blocked(ref, result);
+        return *result != BLOCKED_OPAQUE;
+    });
 }
 
 }  // namespace luch::cpu

@@ -12,22 +12,38 @@ namespace luch::cpu {
 // precision may be off as much again. |f| is at most the sum over the axes.
 constexpr float SPHERE_SLACK = 64.0f * EPS;
 
-template <Precision P>
-struct SphereBlockRay {
+// A ray's line as eight primitives that have a distance from it look at it.
+struct BlockLine {
     f8 origin[3], direction[3];  // of length near 1: squares keep their range
     f8 inverse_a;
-    Vec3 exact_origin, exact_direction;
-    float t_min;
 
-    SphereBlockRay(const LaneRay& ray, float t_min_)
-        : exact_origin(ray.origin3()), exact_direction(ray.direction3()), t_min(t_min_) {
-        Vec3 d = exact_direction * (1.0f / max_component(abs_v(exact_direction)));
+    BlockLine(Vec3 from, Vec3 along) {
+        Vec3 d = along * (1.0f / max_component(abs_v(along)));
         for (int axis = 0; axis < 3; ++axis) {
-            origin[axis] = splat<f8>(exact_origin[axis]);
+            origin[axis] = splat<f8>(from[axis]);
             direction[axis] = splat<f8>(d[axis]);
         }
         inverse_a = splat<f8>(1.0f / dot(d, d));
     }
+};
+
+// Bits of the lanes whose squared distance is not surely beyond the limit.
+LUCH_FN u32 lanes_within(f8 distance2, f8 limit) {
+    f8 limit2 = limit * limit + 1e-43f;  // denormal squares have few digits
+    // Where a square overflowed or is NaN, the test decides.
+    return ~(mask_le(limit2, distance2) & mask_le(distance2, splat<f8>(3.402823466e+38f))) & 255u;
+}
+
+template <Precision P>
+struct SphereBlockRay : BlockLine {
+    Vec3 exact_origin, exact_direction;
+    float t_min;
+
+    SphereBlockRay(const LaneRay& ray, float t_min_)
+        : BlockLine(ray.origin3(), ray.direction3()),
+          exact_origin(ray.origin3()),
+          exact_direction(ray.direction3()),
+          t_min(t_min_) {}
 };
 
 // Bits of the lanes that the ray's line may touch; never drops one that the test would take.
@@ -45,10 +61,7 @@ LUCH_FN u32 line_may_touch(const SphereBlock& block, const SphereBlockRay<P>& ra
         distance2 += p * p;
     }
     f8 radius = load<f8>(block.radius);
-    f8 limit = max_of(radius, -radius) * (1.0f + 8.0f * EPS) + reach * SPHERE_SLACK;
-    f8 limit2 = limit * limit + 1e-43f;  // denormal squares have few digits
-    // Where a square overflowed or is NaN, the test decides.
-    return ~(mask_le(limit2, distance2) & mask_le(distance2, splat<f8>(3.402823466e+38f))) & 255u;
+    return lanes_within(distance2, max_of(radius, -radius) * (1.0f + 8.0f * EPS) + reach * SPHERE_SLACK);
 }
 
 template <Precision P>

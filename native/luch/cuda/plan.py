@@ -10,7 +10,7 @@ from typing import Any
 
 from luch.effects import effects_of
 from luch.effects.forcing import ALL
-from luch.effects.lobes import most_lobes, needs_of
+from luch.effects.lobes import possible_in
 from luch.scene import Scene
 
 # Define -> effects that need it, by their names in luch.effects; a name that ends in * stands for all that begin so.
@@ -86,12 +86,12 @@ def plan_of(scene: Scene, operations: set[str], facts: Mapping[str, Any]) -> dic
     """
     if ALL in scene.settings.force_effects:
         return dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD, *POSSIBLE], True) | {"MOST_LOBES": MOST_LOBES}
-    effects, needs = effects_of(scene), needs_of(scene)
+    effects, possible = effects_of(scene), possible_in(scene)
     plan: dict[str, bool | int] = {
         define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()
     }
-    plan |= {define: name in needs for define, name in POSSIBLE.items()}
-    plan["MOST_LOBES"] = min(most_lobes(scene), MOST_LOBES)
+    plan |= {define: name in possible.needs for define, name in POSSIBLE.items()}
+    plan["MOST_LOBES"] = min(possible.most_lobes, MOST_LOBES)
     plan |= {define: bool(facts[name]) for define, name in TOLD.items()}
     plan |= {define: any(name in operations for name in names) for define, names in MADE_BY.items()}
     return plan

@@ -10,6 +10,7 @@ from __future__ import annotations
 import struct
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
@@ -58,6 +59,11 @@ def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
         first += count
 
 
+def _on_device(pixels: Any) -> Any:
+    """A list of them, uint32; None (all of them) stays."""
+    return None if pixels is None else cupy().asarray(np.asarray(pixels, np.uint32))
+
+
 def _told_images(sizes: list[int]) -> list[str]:
     if not sizes:
         return []
@@ -97,15 +103,15 @@ class HostScene:
         own_counts[...] = counts
 
 
-class HostFilm:
+class HostFilm(ABC):
     """What is read from the film on the host: of any renderer whose film lies on devices."""
 
     def __init__(self, host: HostScene) -> None:
         self._host = host
 
+    @abstractmethod
     def _download(self) -> None:
         """Brings the film's sums to the host, if they are not there."""
-        raise NotImplementedError
 
     def passes(self) -> dict[str, Any]:
         """Blender's pass name -> float32 (H, W, C), bottom row first."""
@@ -182,11 +188,9 @@ class DeviceRenderer(HostFilm):
         )
         self._most_rounds = int(facts["most_rounds"])
         self._media = facts["media"] and bool(self._stages.plan["VOLUMES"])
-        film = self._scene.film
-        x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
         self._transparent = bool(facts["transparent"])
         beside = Beside(self._walks is not None, self._media, facts["moves"], self._timed, self._transparent)
-        self._memory = self._allocate((x1 - x0) * (y1 - y0), max(1, facts["materials"]), beside)
+        self._memory = self._allocate(self._scene.film.pixels, max(1, facts["materials"]), beside)
         return not self._cancelled
 
     def _upload(self) -> tuple[dict[str, Any], Blocks]:
@@ -267,7 +271,7 @@ class DeviceRenderer(HostFilm):
         """(pixels on the device or None, (first of them, how many, first sample, samples))."""
         memory = self._memory
         for pixels, first, count in work:
-            listed = None if pixels is None else cupy().asarray(np.asarray(pixels, np.uint32))
+            listed = _on_device(pixels)
             total = memory.pixels if listed is None else len(listed)
             for sample, samples in parted(first, count, memory.layers):
                 for pixel in range(0, total, memory.layer_pixels):
@@ -277,7 +281,7 @@ class DeviceRenderer(HostFilm):
         """Parts this device's samples before that one of all devices from those after it, if it is a power of two."""
         with self._lock, self._device:
             enter_context()
-            self._memory.mark(sample, None if pixels is None else cupy().asarray(np.asarray(pixels, np.uint32)))
+            self._memory.mark(sample, _on_device(pixels))
 
     def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int, listed: Any) -> None:
         memory, rays, began = self._memory, pixels * samples, time.perf_counter()
@@ -333,15 +337,16 @@ class DeviceRenderer(HostFilm):
                 self._launch(self._walks.kernel("probe_profiles"), turn, walks)
             with self._clock("exits"):
                 self._launch(stages.kernel("shade_exits"), turn, walks)
-        shadows += self._cast_shadows(turn)
+        shadows += self._cast_shadows(turn, last=True)
         self._launch(paths.kernel("next_round"), turn, 1)
         return shadows
 
-    def _cast_shadows(self, turn: int) -> int:
+    def _cast_shadows(self, turn: int, last: bool = False) -> int:
         """Traces the shadow rays so far and adds their light; returns how many there were.
 
         A path may have one of them waiting that adds to Combined, no more: its film's sums are no atomic ones. So what
         its flight through a medium cast is added before its surface is lit, and that before its exit from below one.
+        last: of this round, after which the device clears the counters itself.
         """
         memory = self._memory
         shadows = memory.count("shadows")
@@ -354,7 +359,8 @@ class DeviceRenderer(HostFilm):
                 self._launch(self._stages.kernel("add_shadows"), turn, shadows)
                 if self._transparent:
                     self._launch(self._stages.kernel("see_through"), turn, shadows, self._tracer.root)
-            memory.clear("shadows", "shadowed", "see_through")
+            if not last:
+                memory.clear("shadows", "shadowed", "see_through")
         return shadows
 
     def _clock(self, stage: str) -> AbstractContextManager[None]:

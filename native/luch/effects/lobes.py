@@ -7,6 +7,7 @@ on; what is named may never happen.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,26 +31,26 @@ def programs_of(scene: Scene) -> list[Program]:
             *(lamp.program for lamp in scene.lights if lamp.program is not None)]  # fmt: skip
 
 
-def needs_of(scene: Scene) -> set[str]:
-    """Names of what lobes and lookups may have. Raises ValueError if a program is damaged."""
+@dataclass(frozen=True)
+class Possible:
+    """What may be met at some point of a scene."""
+
+    needs: frozenset[str]  # names of what lobes and lookups may have
+    most_lobes: int  # at one point, 1 or more
+
+
+def possible_in(scene: Scene) -> Possible:
+    """Raises ValueError if a program is damaged."""
     needs = {_PIXELS[image.pixels.dtype] for image in scene.images if image.pixels.dtype in _PIXELS}
+    most = 1
     for program in programs_of(scene):
         nodes, constants = decode(program)
-        for node in nodes:
-            if node.op.closure:
-                needs.update(_of_closure(Closure(node, constants)))
-            elif node.op.name in _INTERPOLATION and node.params[_INTERPOLATION[node.op.name]] == _CUBIC:
-                needs.add("cubic images")
-    return needs
-
-
-def most_lobes(scene: Scene) -> int:
-    """How many lobes a point can have at most, 1 or more."""
-    counts = [1]
-    for program in programs_of(scene):
-        nodes, constants = decode(program)
-        counts.append(sum(_lobes(Closure(node, constants)) for node in nodes if node.op.closure))
-    return max(counts)
+        closures = [Closure(node, constants) for node in nodes if node.op.closure]
+        needs.update(name for closure in closures for name in _of_closure(closure))
+        most = max(most, sum(map(_lobes, closures)))
+        if any(node.params[_INTERPOLATION[node.op.name]] == _CUBIC for node in nodes if node.op.name in _INTERPOLATION):
+            needs.add("cubic images")
+    return Possible(frozenset(needs), most)
 
 
 def _of_closure(c: Closure) -> Iterator[str]:

@@ -15,7 +15,7 @@ from luch.shader_code import OPS, Node, Value
 _OP_OF = {op.code: op for op in OPS.values()}
 # Operations without effect while their first input, a strength, is known to be 0.
 _BY_STRENGTH = ("BUMP", "NORMAL_MAP")
-_TILED = 2  # ImageFlag of shade/textures/image_nodes.h
+TILED = 2  # ImageFlag of shade/textures/image_nodes.h
 
 
 @dataclass
@@ -110,7 +110,7 @@ def _images(nodes: list[Node], program: Program) -> list[int]:
     """Indices of the images that operations look up, each once, in order."""
     slots: list[int] = []
     for node in nodes:
-        if node.op.name == "IMAGE" and node.params[4] & _TILED:
+        if node.op.name == "IMAGE" and node.params[4] & TILED:
             slots += node.params[6::2]
         elif node.op.name in ("IMAGE", "IMAGE_BOX", "ENVIRONMENT"):
             slots.append(node.params[0])

@@ -19,10 +19,9 @@ import numpy as np
 from luch import denoise
 from luch.accuracy import NORMAL_95
 from luch.effects import effects_of
-from luch.render import film_pixels
 from luch.report.plan import AS_SET, EXACT, Plan, Variant, plan
 from luch.report.results import Point, Report, Row
-from luch.report.shots import GoesOn, Shot, scaled, shoot, size_of
+from luch.report.shots import GoesOn, Shot, scaled, shoot
 from luch.report.tally import (
     Tally,
     brightness_of,
@@ -158,15 +157,14 @@ class Session:
         self._plan: Plan = plan(self.scene, effects_of(self.scene), stats.get("accelerator", ""),
                                 int(stats.get("triangles", 0)))  # fmt: skip
         self._variants = [v for v in self._plan.variants if self._only is None or self._only(v)]
-        pace = shot.trace_seconds / (film_pixels(small.film) * samples)  # a path
+        pace = shot.trace_seconds / (small.film.pixels * samples)  # a path
         self._unmeasured = []
         if self.seconds < LEAST_SECONDS_TO_FILTER:
             self._leave_out(lambda variant: variant.denoised)
         self._filters = any(variant.denoised for variant in self._variants)
         if self._filters:
             self._doing = "denoising, for the time"
-            width, height = size_of(self.scene.film)
-            self._denoise_seconds = denoise.seconds_for(width * height)
+            self._denoise_seconds = denoise.seconds_for(self.scene.film.pixels)
         if not self._goes_on():
             raise Cancelled
         self._choose_size(pace, shot.build_seconds)
@@ -174,7 +172,7 @@ class Session:
 
     def _choose_size(self, pace: float, build: float) -> None:
         """The picture grows with the time; samples grow when it is large enough."""
-        width, height = size_of(self.scene.film)
+        width, height = self.scene.film.size
         renders = GOOD_ROUNDS * len(self._variants) * (1.0 + 1.0 / ANCHOR_EVERY)
         tracing = max(0.05 * self.seconds, (1.0 - REFERENCE_SHARE) * self.left - renders * build)
         paths = tracing / (renders * AVERAGE_COST * pace)
@@ -182,13 +180,13 @@ class Session:
         longest = self._size or math.sqrt(paths / samples * max(width, height) / min(width, height))
         longest = int(min(max(longest, LEAST_SIZE), max(MOST_SIZE, self._size), max(width, height)))
         self._small = scaled(self.scene, longest)
-        pixels = film_pixels(self._small.film)
+        pixels = self._small.film.pixels
         while samples < MOST_SAMPLES and 2 * samples * pixels < paths:
             samples *= 2
         self._samples = self._asked_samples or samples
 
     def _drop_what_does_not_fit(self, pace: float, build: float) -> None:
-        each = build + AVERAGE_COST * pace * film_pixels(self._small.film) * self._samples
+        each = build + AVERAGE_COST * pace * self._small.film.pixels * self._samples
         fits = int((1.0 - REFERENCE_SHARE) * self.left / (LEAST_ROUNDS * each * (1.0 + 1.0 / ANCHOR_EVERY)))
         kept = [variant.name for variant in self._variants[: max(2, fits)]]
         self._leave_out(lambda variant: variant.name not in kept)
@@ -290,8 +288,8 @@ class Session:
         if logs:  # a few ratios tell their spread badly; the machine's restlessness is that of all
             self._ratio_spread = float(np.sqrt(np.median([np.var(found, ddof=1) for found in logs])))
         base = next((f for f in measured if f.variant.name == self._plan.base.name), measured[0])
-        width, height = size_of(self._small.film)
-        full_width, full_height = size_of(self.scene.film)
+        width, height = self._small.film.size
+        full_width, full_height = self.scene.film.size
         left_out = [f.variant.name for f in self._found if f not in measured]
         return Report(
             scene=self.scene.name, width=width, height=height, full_width=full_width, full_height=full_height,

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from luch import denoise
+from luch.pixel_error import wanted
 from luch.render import Progress, render
-from luch.scene import F32, Film, Scene
+from luch.scene import F32, Scene
+from luch.stopping import CUSTOM
 
 GoesOn = Callable[[], bool]
 FIRST_KEPT = 2  # samples; a single one says nothing of the rate
@@ -42,16 +44,10 @@ def scaled(scene: Scene, longest: int) -> Scene:
         x0, y0, x1, y1 = (round(edge * factor) for edge in border)
         border = (x0, y0, max(x1, x0 + 1), max(y1, y0 + 1))
     small = replace(film, width=max(1, round(film.width * factor)), height=max(1, round(film.height * factor)),
-                    border=border, passes=[name for name in film.passes if name != "Error"])  # fmt: skip
-    settings = replace(scene.settings, quality="CUSTOM", denoise=False, time_limit=0.0, error_limit=0.0, estimate_error=False, verify=False,
-                       mergeable=False, first_sample=0, samples_in_all=0)  # fmt: skip
+                    border=border, passes=[name for name in film.passes if name not in wanted(film)])  # fmt: skip
+    settings = replace(scene.settings, quality=CUSTOM, denoise=False, time_limit=0.0, error_limit=0.0,
+                       estimate_error=False, verify=False, mergeable=False, first_sample=0, samples_in_all=0)  # fmt: skip
     return replace(scene, film=small, settings=settings)
-
-
-def size_of(film: Film) -> tuple[int, int]:
-    """Pixels that are rendered, across and up."""
-    x0, y0, x1, y1 = film.border or (0, 0, film.width, film.height)
-    return x1 - x0, y1 - y0
 
 
 def shoot(scene: Scene, seed: int, samples: int, goes_on: GoesOn, *, denoised: bool = False) -> Shot | None:
