@@ -19,13 +19,21 @@ class Truth:
     is no error. What both must have in common is their energy.
     """
 
-    def __init__(self, picture: F64, samples: int) -> None:
-        self.picture, self.samples = picture, samples
+    def __init__(self, picture: F64, samples: int, noise: float | None = None) -> None:
+        """noise: relMSE of the picture itself; None: as that of whatever is held against it, by their samples."""
+        self.picture, self.samples, self.noise = picture, samples, noise
 
     def error(self, picture: F64, samples: float) -> float:
-        """Of a picture of so many samples, the reference's own noise taken out."""
-        whole = np.mean((picture[..., :3] - self.picture) ** 2 / (np.abs(self.picture) + DARK) ** 2)
-        return float(np.sqrt(whole / (1.0 + samples / self.samples)))
+        """Of a picture of so many samples, the reference's own noise taken out. Raises ValueError where that is all."""
+        whole = float(np.mean((picture[..., :3] - self.picture) ** 2 / (np.abs(self.picture) + DARK) ** 2))
+        left = whole / (1.0 + samples / self.samples) if self.noise is None else whole - self.noise
+        if not left > 0.0 and whole > 0.0:
+            raise ValueError(f"a reference of {self.samples} samples is no better than what it measures: take more")
+        return float(np.sqrt(left))
+
+    def noise_beside(self, error: float, samples: float) -> float:
+        """The reference's relMSE over that of a picture with this error, of so many samples."""
+        return samples / self.samples if self.noise is None else self.noise / error**2
 
     def brightness(self, picture: F64) -> float:
         """Over the reference's, less 1."""
