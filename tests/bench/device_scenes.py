@@ -3,13 +3,15 @@
 A GPU machine may have no network and no shared scenes, so the race has three parts:
 
   build.py bench device_scenes pack FOLDER     here: .blend and .luch of each scene, sized as their references
-  python device_scenes.py luch FOLDER OUT      there: needs CuPy and Luch
+  python device_scenes.py luch FOLDER OUT [--general]      there: needs CuPy and Luch
   python3.13 device_scenes.py cycles FOLDER OUT CUDA|OPTIX     there: needs bpy
   build.py bench device_scenes judge OUT       here: errors against the references, the table, the record
 
 Seconds are of 1,024 samples at four times the reference's pixels (about 518,400), less those of one sample: no start,
 no compiling, no export. Errors are of pictures of the reference's own size. The ratio of a scene is Luch's seconds
-times its error over Cycles' seconds times its error, as errors fall as one over the samples.
+times its error over Cycles' seconds times its error, as errors fall as one over the samples; bias is the cross product
+of two seeds' differences from the reference. --general times the kernels that `build.py build --cuda` compiled for any
+scene beside the scene's own. Scenes that no peer rendered stand in the table without a ratio.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import json
 import math
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +30,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(ROOT), str(ROOT / "native"), str
 
 SCENES = ["cornell_box", "veach_mis", "modern_hall", "volumetric_caustic", "white_room", "little_lamp"]
 SAMPLES = 1024
+GENERAL_SAMPLES = 128
 SIDES = 2  # of the timed frame over the reference's
 SEED = 11
 
@@ -77,6 +81,7 @@ def luch(options: argparse.Namespace) -> int:
 
     import numpy as np
     from device_render import StageTimes
+    from economy_page import commit
     from luch.cuda import device
     from luch.render import render
     from luch.scenefile import read_scene
@@ -87,8 +92,8 @@ def luch(options: argparse.Namespace) -> int:
         film = replace(scene.film, passes=["Combined"])
         large = replace(film, width=film.width * SIDES, height=film.height * SIDES)
 
-        def run(samples: int, film: Any = large, scene: Any = scene) -> Any:
-            settings = replace(scene.settings, samples=samples, device="CUDA", time_limit=0.0, seed=SEED)
+        def run(samples: int, film: Any = large, scene: Any = scene, seed: int = SEED) -> Any:
+            settings = replace(scene.settings, samples=samples, device="CUDA", time_limit=0.0, seed=seed)
             return render(replace(scene, film=film, settings=settings))
 
         first = run(1)  # compiles
@@ -96,8 +101,11 @@ def luch(options: argparse.Namespace) -> int:
         with StageTimes() as times:
             run(64)
         stages = times.milliseconds()
-        kept[name] = run(SAMPLES, film).passes["Combined"][::-1, :, :3]
+        for index in range(2):
+            kept[f"{name}.{index}"] = run(SAMPLES, film, seed=SEED + index).passes["Combined"][::-1, :, :3]
         seconds[name] = {
+            "general": _general_over_own(run) if options.general else None,
+            "shading": many.stats.get("shading_kernel"),
             "seconds": many.stats["render_seconds"] - one.stats["render_seconds"],
             "fixed": one.stats["render_seconds"] + one.stats["prepare_seconds"],
             "compile": first.stats["kernel_compile_seconds"],
@@ -105,10 +113,32 @@ def luch(options: argparse.Namespace) -> int:
             "warnings": many.stats["warnings"],
         }
         print(name, json.dumps(seconds[name]), flush=True)
-    options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "luch.json").write_text(json.dumps({"machine": device.describe(), "scenes": seconds}))
+        options.out.mkdir(parents=True, exist_ok=True)
+        told = {"machine": device.describe(), "commit": commit(), "scenes": seconds}
+        (options.out / "luch.json").write_text(json.dumps(told))
     np.savez_compressed(options.out / "luch.npz", **kept)
     return 0
+
+
+def _general_over_own(run: Callable[[int], Any]) -> float | None:
+    """Seconds of the general kernels over those of the scene's own. None: no general ones, or a scene that needs more."""
+    from unittest import mock
+
+    from luch.cuda import compiler
+    from luch.cuda.scene_kernels import SceneKernels
+
+    def seconds() -> tuple[float, bool]:
+        one, many = run(1).stats, run(GENERAL_SAMPLES).stats
+        return many["render_seconds"] - one["render_seconds"], many["kernels"] == "general"
+
+    own = seconds()[0]
+    nothing = mock.patch.object(compiler, "kept_scene", return_value=None)
+    with nothing, mock.patch.object(SceneKernels, "_compile"), mock.patch.object(SceneKernels, "_take"):
+        try:
+            general, real = seconds()
+        except AssertionError:  # no kernels at all
+            return None
+    return general / own if real else None
 
 
 def cycles(options: argparse.Namespace) -> int:
@@ -175,22 +205,33 @@ def judge(options: argparse.Namespace) -> int:
     own, rows = np.load(options.out / "luch.npz"), []
     for name, told in ours["scenes"].items():
         reference = pictures.read_passes(folder / "reference" / f"{name}.exr")["Combined"][..., :3]
-        energy = pictures.energy_ratio(own[name], reference)
-        row = {"scene": name, "seconds": told["seconds"], "fixed": told["fixed"], "stages": told["stages"],
-               "error": pictures.rel_mse(own[name], reference), "energy": [float(part) for part in energy]}  # fmt: skip
-        for backend, of in peers.items():
+        first, second = (own[f"{name}.{index}"] for index in range(2))
+        energy = pictures.energy_ratio((first + second) / 2, reference)
+        row = {"scene": name, **told, "error": pictures.rel_mse(first, reference),
+               "bias": pictures.bias_rel_mse(first, second, reference),
+               "energy": [float(part) for part in energy]}  # fmt: skip
+        raced = {backend: of for backend, of in peers.items() if name in of}
+        for backend, of in raced.items():
             (picture,) = pictures.read_passes(options.out / f"{name}-{backend}.exr").values()
             error = pictures.rel_mse(picture, reference)
             row[backend] = {**of[name], "error": error,
                             "ratio": row["seconds"] * row["error"] / (of[name]["seconds"] * error)}  # fmt: skip
-        row["ratio"] = max(row[backend]["ratio"] for backend in peers)  # of the better peer
+        row["ratio"] = max((row[backend]["ratio"] for backend in raced), default=None)  # of the better peer
         rows.append(row)
         dear = ", ".join(f"{kernel} {share:.0%}" for kernel, share in list(told["stages"].items())[:4])
-        versus = "  ".join(f"{b} {row[b]['seconds']:.1f} s {row[b]['error']:.5f}" for b in peers)
-        print(f"{name:20} {row['seconds']:6.2f} s {row['error']:.5f}  {versus}  ratio {row['ratio']:.2f}  ({dear})")
-    mean = math.exp(sum(math.log(row["ratio"]) for row in rows) / len(rows))
+        versus = "  ".join(f"{b} {row[b]['seconds']:.1f} s {row[b]['error']:.5f}" for b in raced)
+        print(f"{name:22} {row['seconds']:6.2f} s {row['error']:.5f}  bias {row['bias']:.1e}  energy "
+              f"{'  '.join(f'{part:.4f}' for part in energy)}  {versus}  ratio {row['ratio'] or math.nan:.2f}  ({dear})")  # fmt: skip
+    ratios = [row["ratio"] for row in rows if row["ratio"]]
+    mean = math.exp(sum(math.log(ratio) for ratio in ratios) / len(ratios))
     print(f"geometric mean of the ratios {mean:.2f}; bar 1.0, goal 0.5")
-    record = {"machine": ours["machine"], "samples": SAMPLES, "rows": rows, "geometric_mean": mean}
+    record = {
+        "machine": ours["machine"],
+        "commit": ours["commit"],
+        "samples": SAMPLES,
+        "rows": rows,
+        "geometric_mean": mean,
+    }
     target = ROOT / "tests" / "bench" / "records" / "scenes-cuda.json"
     target.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return 0
@@ -207,6 +248,8 @@ def main() -> int:
             part.add_argument(place, type=Path)
         if name == "cycles":
             part.add_argument("device", choices=["CUDA", "OPTIX"])
+        if name == "luch":
+            part.add_argument("--general", action="store_true", help="time the general kernels too")
         if name != "judge":
             part.add_argument("--scene", nargs="+", default=SCENES, metavar="NAME")
         part.set_defaults(run=run)

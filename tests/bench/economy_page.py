@@ -13,7 +13,9 @@ DEVICES = ("CPU", "CUDA")
 TITLES = {"idle": "**{}: what is idle, simulated all the same.** Time over that of the scene's own plan, with a 95 % "
           "interval; bytes and code beside those of the plan.",
           "left out": "**{}: what is there, left out.** Time over that of the whole scene; how much the picture changes, "
-          "noise included."}  # fmt: skip
+          "noise included.",
+          "moving": "**{}: what moves.** Time over that of the same scene when all stands still; how much the picture "
+          "changes. *hidden*: one that no ray can meet."}  # fmt: skip
 
 
 def record_of(device: str) -> Path:
@@ -63,7 +65,7 @@ def _cells(kind: str, row: dict[str, Any] | None) -> tuple[str, str]:
     if row is None:
         return "", ""
     time = f"{row['ratio']:.3f} ({row['low']:.3f} to {row['high']:.3f})"
-    if kind == "left out":
+    if kind != "idle":
         return time, f"relMSE {row['difference']:.2g}"
     told = [] if row["same_bits"] else ["**other bits**"]
     told += [f"{change:+,} {field.replace('_', ' ')}" for field, change in row["bytes"].items()]

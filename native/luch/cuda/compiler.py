@@ -27,6 +27,8 @@ PACKAGE = Path(__file__).resolve().parents[1]
 SCENES_KEPT = 8
 AHEAD = PACKAGE / "kernels"  # NAME.cubin, compiled by build.py
 _COMPILING: dict[str, threading.Lock] = collections.defaultdict(threading.Lock)  # by name in the cache
+# NVRTC optimises the functions of a program on threads: half the time on two cores. Version 13.0 is the oldest tried.
+SPLITS_FROM, MOST_SPLIT = (13, 0), 8
 SCENE_PROGRAMS = "luch_scene_programs.cuh"  # the header that a scene's own kernels include
 
 
@@ -190,6 +192,8 @@ def _compile(nvrtc: Any, unit: _Unit) -> bytes:
     known = [a for a in nvrtc.getSupportedArchs() if a <= architecture]
     target = f"sm_{architecture}" if architecture in known else f"compute_{max(known)}"  # the driver compiles PTX on
     options = [f"-arch={target}", f"-I{include}", f"-I{kernels}", *flags(unit.precision), *unit.defines]
+    if nvrtc.getVersion() >= SPLITS_FROM:
+        options.append(f"-split-compile={min(MOST_SPLIT, os.cpu_count() or 1)}")  # on threads; the same instructions
     source = source_of(module)
     # CuPy wants bytes here, and only here.
     headers = ((unit.programs.encode(),), (SCENE_PROGRAMS.encode(),)) if unit.programs else ((), ())

@@ -1,0 +1,89 @@
+"""What motion costs where little moves: 24 balls on a floor, none, one or all of them moving.
+
+  build.py bench movers [--device CUDA] [--samples 32] [--rounds 9]
+
+Renders of one process in turns (still, moving, still, ...); the ratio of each pair's seconds, its median and a 95 %
+interval. "hidden": a ball moves that no ray can meet, below the floor. Rows are kept beside those of the economy bench
+(tests/bench/records/economy-DEVICE.json, scene "24 balls") and stand in docs/effects.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "native"), str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
+
+import economy  # noqa: E402
+import numpy as np  # noqa: E402
+from luch.scene import InstanceMotion, Mesh, Object, Scene, Shutter  # noqa: E402
+from support.accel_meshes import icosphere  # noqa: E402
+from support.from_above import scene_of  # noqa: E402
+
+SIDE = 4, 6  # balls
+APART = 2.5
+STEP = 0.5  # what a mover covers while the shutter is open
+
+
+def ball() -> Mesh:
+    """20,480 triangles."""
+    positions, triangles = icosphere(5)
+    return Mesh("Ball", positions, triangles, material_slots=np.zeros(len(triangles), np.uint16))
+
+
+def floor() -> Mesh:
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32) * np.float32(40.0)
+    return Mesh("Floor", corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), material_slots=np.zeros(2, np.uint16))
+
+
+def balls() -> Scene:
+    """Still. The last ball lies under the floor."""
+    matrices = [np.eye(3, 4) for _ in range(SIDE[0] * SIDE[1] + 2)]
+    for index, matrix in enumerate(matrices[:-2]):
+        row, column = divmod(index, SIDE[1])
+        matrix[:, 3] = (column - (SIDE[1] - 1) / 2) * APART, (row - (SIDE[0] - 1) / 2) * APART, 1.0
+    matrices[-2][:, 3] = 0.0, 0.0, -5.0
+    scene = scene_of(
+        ball(), width=16.0, size=320, above=30.0, matrices=np.stack(matrices), world=1.0, passes=["Combined"]
+    )
+    scene.meshes.append(floor())
+    scene.objects.append(Object("Floor", 1, [0]))
+    scene.instances.object[-1] = 1
+    scene.settings = replace(scene.settings, threads=0, accelerator="AUTO")
+    return scene
+
+
+def moving(scene: Scene, which: list[int]) -> Scene:
+    """Sideways, evenly."""
+    keys = []
+    for instance in which:
+        for side in (-0.5, 0.5):
+            matrix = scene.instances.matrix[instance].copy()
+            matrix[0, 3] += side * STEP
+            keys.append(matrix)
+    motion = InstanceMotion(np.array(which, np.uint32), np.full(len(which), 2, np.uint32), np.stack(keys))
+    return replace(scene, instances=replace(scene.instances, motion=motion), shutter=Shutter())
+
+
+def main() -> int:
+    """Prints and keeps four rows."""
+    parser = argparse.ArgumentParser(prog="build.py bench movers", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+    parser.add_argument("--device", default="CPU", type=str.upper, choices=["CPU", "CUDA"])
+    parser.add_argument("--samples", type=int, default=32)
+    parser.add_argument("--rounds", type=int, default=9)
+    options = parser.parse_args()
+    still = economy.asking(balls(), samples=options.samples, device=options.device)
+    count = SIDE[0] * SIDE[1]
+    for name, which in (("hidden", [count]), ("1 of 24", [count // 2 + SIDE[1] // 2]), ("all 24", list(range(count)))):
+        row = economy.compare(still, moving(still, which), options.rounds)
+        economy.keep(options.device, "24 balls", "moving", name, row)
+        print(f"{name:10} {row['ratio']:.3f} ({row['low']:.3f} to {row['high']:.3f})", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
