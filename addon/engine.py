@@ -12,7 +12,7 @@ import bpy
 from luch import record
 from luch.scene import Scene
 
-from . import mergeable, passes
+from . import mergeable, passes, viewport
 from .report import Reporter, describe_error
 from .result import ResultWriter
 
@@ -78,6 +78,22 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         mergeable.keep(depsgraph.scene, depsgraph.view_layer.name, scene, result)
         reporter.say_how_it_went(stats)
         writer.stamp(stats, scene)
+
+    def view_update(self, context: Any, depsgraph: Any) -> None:
+        """Something of the file changed, or a 3D view shows Luch for the first time. Tells errors in the view."""
+        self._viewport().update(context, depsgraph, self.get_preview_pixel_size(depsgraph.scene))
+        viewport.watch(self)
+
+    def view_draw(self, context: Any, depsgraph: Any) -> None:
+        """Draw what there is by now."""
+        self._viewport().draw(context, depsgraph, self)
+        viewport.watch(self)
+
+    def _viewport(self) -> viewport.Viewport:
+        """This engine's own: Blender keeps an engine for each 3D view that it draws."""
+        if not hasattr(self, "view"):
+            self.view = viewport.Viewport()
+        return self.view
 
     def _mesh_cache(self, depsgraph: Any) -> MeshCache:
         """The view layer's meshes of the frame before, if the user wants them kept; Blender then keeps this engine."""
@@ -146,5 +162,6 @@ def register() -> None:
 
 
 def unregister() -> None:
+    viewport.stop_all()
     bpy.app.handlers.render_write.remove(write_record)
     bpy.utils.unregister_class(LuchRenderEngine)

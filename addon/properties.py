@@ -104,6 +104,18 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         description="Stop when the picture's error is that small (relative, root mean square over all pixels); 0 for no limit. "
         "Max Samples still holds",
     )
+    preview_samples: IntProperty(
+        name="Viewport Samples", default=1024, min=0, max=1 << 24,
+        description="Paths through every pixel of a viewport; 0 for no limit",
+    )  # fmt: skip
+    preview_time_limit: FloatProperty(
+        name="Viewport Time Limit", default=0.0, min=0.0, unit="TIME_ABSOLUTE",
+        description="A viewport's picture stops after this many seconds; 0 for no limit",
+    )  # fmt: skip
+    preview_error_limit_percent: FloatProperty(
+        name="Viewport Error Limit", default=0.0, min=0.0, soft_max=20.0, max=100.0, precision=2, subtype="PERCENTAGE",
+        description="A viewport's picture stops when its error is that small; 0 for no limit. Viewport Samples still holds",
+    )  # fmt: skip
     quality: EnumProperty(
         name="Quality",
         items=[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -106,6 +107,33 @@ def progress_line(progress: Any) -> str:
     if math.isfinite(progress.remaining_seconds):
         parts.append(f"Remaining {clock(progress.remaining_seconds)}")
     parts.append(f"{progress.memory_bytes / MIB:.0f} MiB")
+    return " | ".join(parts)
+
+
+def viewport_line(progress: Any) -> str:
+    """For a 3D view's status: "Sample 64/1024 | Error 0.80 % (0.70 to 0.90 %) - 12 s to 0.5 %"."""
+    if progress.preparing:
+        return "Building structures and lights"
+    parts = [f"Sample {progress.samples}/{progress.total_samples}"]
+    found = progress.curve.last if progress.curve is not None else None
+    if found is not None:
+        text = f"Error {percent(found.error)} % ({percent(found.error_low)} to {percent(found.error_high)} %)"
+        aim = progress.asked_error or (next_target(found.error) if found.error > 0.0 else 0.0)
+        ahead = progress.forecast
+        if ahead is not None and 0.0 < ahead.seconds < math.inf:
+            text += f" - {ahead.seconds:.2g} s to {aim * 100:g} %"
+        parts.append(text)
+    return " | ".join(parts)
+
+
+def viewport_end_line(stats: Mapping[str, Any]) -> str:
+    """The same of a picture that is finished, and why it is."""
+    parts = [f"Sample {stats['samples']}/{stats['samples_asked']}"]
+    if "error" in stats:
+        low, high = percent(stats["error_low"]), percent(stats["error_high"])
+        parts.append(f"Error {percent(stats['error'])} % ({low} to {high} %)")
+    if stats.get("stopped_by") in record.ENDS:
+        parts.append(record.ENDS[stats["stopped_by"]].capitalize())
     return " | ".join(parts)
 
 

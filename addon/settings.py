@@ -8,6 +8,7 @@ from typing import Any
 SHARED_WITH_CYCLES = frozenset(
     {
         "samples",
+        "preview_samples",
         "time_limit",
         "use_denoising",
         "seed",

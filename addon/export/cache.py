@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +11,7 @@ from luch.scene import Mesh
 
 from .context import ExportContext
 from .curves import export_curves
+from .kept_images import KeptImages
 from .meshes import export_mesh
 from .points import export_points
 
@@ -31,10 +34,11 @@ class MeshCache:
     def __init__(self) -> None:
         self._entries: dict[int, _Entry] = {}
         self._generation = 0
+        self.images = KeptImages()
         self.read_count = 0  # meshes copied out of Blender so far
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Forget all meshes."""
         self._entries.clear()
 
     def begin(self, depsgraph: Any) -> None:
@@ -46,6 +50,7 @@ class MeshCache:
             if entry.generation == self._generation and not (entry.owners & changed)
         }
         self._generation += 1
+        self.images.begin({update.id.original.session_uid for update in depsgraph.updates})
 
     def mesh(self, subject: Any, parent: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
         """The exported mesh of an object's evaluated data with at least the wanted attributes; None: nothing to draw."""
@@ -53,6 +58,8 @@ class MeshCache:
         address = data.as_pointer()
         entry = self._entries.get(address)
         owners = {datablock.original.session_uid for datablock in (subject, parent, data)}
+        if entry is not None and data.original.session_uid not in entry.owners:
+            entry = None  # the mesh that was there is gone, and another took its place
         if entry is None or not wanted <= entry.wanted:
             wanted = wanted | (entry.wanted if entry else set())
             if subject.type == "POINTCLOUD":
@@ -60,12 +67,27 @@ class MeshCache:
             elif subject.type == "CURVES":
                 mesh = export_curves(data, wanted, context)
             else:
-                mesh = export_mesh(data, wanted, _undeformed(subject, data), context)
+                with _readable(subject, data) as readable:
+                    mesh = export_mesh(readable, wanted, _undeformed(subject, data), context)
             self.read_count += 1
             entry = self._entries[address] = _Entry(mesh, wanted, owners, self._generation)
         entry.owners |= owners
         entry.generation = self._generation
         return entry.mesh
+
+
+@contextmanager
+def _readable(subject: Any, data: Any) -> Iterator[Any]:
+    """A mesh with arrays: one that is being edited is something else until Blender is asked for a copy."""
+    if not data.is_editmode:
+        yield data
+        return
+    copied = subject.to_mesh()
+    try:
+        copied.calc_loop_triangles()
+        yield copied
+    finally:
+        subject.to_mesh_clear()
 
 
 def _undeformed(subject: Any, data: Any) -> Any:

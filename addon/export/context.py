@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from luch.scene import F64, Scene
+
+if TYPE_CHECKING:
+    from .kept_images import KeptImages  # which reads images for this context
 
 
 class ExportContext:
     """Carried through one export. Node compilers use `image_index`, `warn` and `object_matrix`."""
 
-    def __init__(self, depsgraph: Any, result: Scene) -> None:
+    def __init__(self, depsgraph: Any, result: Scene, kept_images: KeptImages | None = None) -> None:
         self.depsgraph = depsgraph
         self.scene: Any = depsgraph.scene
         self.view_layer: Any = depsgraph.view_layer
         self.result = result
         self.frame: int = depsgraph.scene.frame_current
         self._images: dict[tuple[Any, ...], int] = {}
+        self._kept_images = kept_images
         self._warned: set[str] = set()
 
     def warn(self, text: str, effect: str = "") -> None:
@@ -39,7 +43,10 @@ class ExportContext:
         index = self._images.get(key)
         if index is None:
             index = self._images[key] = len(self.result.images)
-            self.result.images.append(export_image(image, user, tile, self))
+            kept = self._kept_images
+            self.result.images.append(
+                kept.image(key, image, user, tile, self) if kept else export_image(image, user, tile, self)
+            )
         return index
 
     def object_matrix(self, subject: Any) -> F64:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from luch.scene import Film
 from .. import passes
 from ..settings import effective
 from .context import ExportContext
+from .view import View
 
 
 def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
@@ -23,17 +25,12 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
         context.warn(f'View layer "{view_layer.name}": pass "{name}" is Cycles\' own; Luch does not render it.')
     scale = render.resolution_percentage / 100.0
     width, height = size or (int(render.resolution_x * scale), int(render.resolution_y * scale))
-    film = Film(
+    film = replace(
+        _look(context),
         width=max(1, width),
         height=max(1, height),
         border=_border(render, width, height),
         pixel_aspect=(render.pixel_aspect_x, render.pixel_aspect_y),
-        filter=effective(scene, "pixel_filter_type"),
-        filter_width=effective(scene, "filter_width"),
-        exposure=effective(scene, "film_exposure"),
-        transparent=render.film_transparent,
-        transparent_glass=effective(scene, "film_transparent_glass"),
-        transparent_roughness=effective(scene, "film_transparent_roughness"),
         alpha_threshold=view_layer.pass_alpha_threshold,
         passes=[entry.name for entry in passes.enabled_passes(view_layer)],
         cryptomatte_depth=passes.cryptomatte_depth(view_layer),
@@ -44,6 +41,26 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
         mist = scene.world.mist_settings
         film.mist = (mist.start, mist.depth, mist.falloff)
     return film
+
+
+def export_view_film(context: ExportContext, view: View) -> Film:
+    """Of a 3D viewport: Combined alone."""
+    return replace(
+        _look(context), width=view.width, height=view.height, border=view.border, pixel_aspect=view.pixel_aspect
+    )
+
+
+def _look(context: ExportContext) -> Film:
+    """What makes Combined look as it does, whatever its size."""
+    scene = context.scene
+    return Film(
+        filter=effective(scene, "pixel_filter_type"),
+        filter_width=effective(scene, "filter_width"),
+        exposure=effective(scene, "film_exposure"),
+        transparent=scene.render.film_transparent,
+        transparent_glass=effective(scene, "film_transparent_glass"),
+        transparent_roughness=effective(scene, "film_transparent_roughness"),
+    )
 
 
 def _border(render: Any, width: int, height: int) -> tuple[int, int, int, int] | None:

@@ -109,6 +109,11 @@ def _path(image: Any, frame: int, tile: int) -> str:
     return path
 
 
+def read_path(image: Any, user: Any, tile: int, frame: int) -> str:
+    """Absolute path of the file that an image shows at a frame of the scene."""
+    return _path(image, _frame_of(user, frame), tile)
+
+
 def _frame_of(user: Any, frame: int) -> int:
     """The file number that an image sequence shows at a frame of the scene."""
     if user is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,14 +31,19 @@ NO_INSTANCER_UV = (0.0, 0.0)
 
 
 def export_instances(
-    context: ExportContext, cache: MeshCache, recorder: MotionRecorder | None = None
+    context: ExportContext,
+    cache: MeshCache,
+    recorder: MotionRecorder | None = None,
+    shown: Callable[[Any], bool] = lambda item: True,
 ) -> InstanceCollector:
     """Fill meshes, objects, instances, materials and lamps of the scene. Each mesh is read once.
 
-    recorder: takes note of every instance, where the shutter is open for a time.
+    recorder: takes note of every instance, where the shutter is open for a time. shown: whether an instance is.
     """
     collector = InstanceCollector(context, cache, recorder)
     for item in context.depsgraph.object_instances:
+        if not shown(item):
+            continue
         if item.show_self:
             collector.add(item)
         if item.show_particles:

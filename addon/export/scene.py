@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from luch.scene import Scene, Shutter
+from luch.scene import Film, Scene, Shutter
 
 from .cache import MeshCache
 from .camera import camera_matrix, export_camera
 from .context import ExportContext
-from .film import export_film
+from .film import export_film, export_view_film
 from .instances import export_instances
 from .motion import MotionRecorder, export_shutter
-from .settings import export_settings
+from .settings import export_settings, export_view_settings
+from .view import View, read_view
 from .world import export_world
 
 
@@ -44,6 +46,48 @@ def export_scene(
         _export_motion(context, cache, engine, shutter)
     result.origin = _origin(result)
     return result
+
+
+def export_view_scene(depsgraph: Any, region: Any, space: Any, cache: MeshCache) -> tuple[Scene, View]:
+    """The same as a region of a 3D viewport shows it, at an instant; and the view. Raises ValueError as export_scene."""
+    result = Scene(name=depsgraph.scene.name, frame=depsgraph.scene.frame_current)
+    context = ExportContext(depsgraph, result, cache.images)
+    cache.begin(depsgraph)
+    _warn_about_what_is_missing(context)
+    _warn_about_what_views_miss(context, space)
+    view = read_view(region, space, context)
+    result.settings = export_view_settings(context)
+    result.world = export_world(context)
+    export_instances(context, cache, shown=lambda item: _is_shown(item, space))
+    _look_through(result, view, export_view_film(context, view))
+    return result, view
+
+
+def seen_anew(scene: Scene, depsgraph: Any, region: Any, space: Any) -> tuple[Scene, View]:
+    """An exported scene through the view as it is now: nothing else is read. Raises ValueError as export_scene."""
+    result = replace(scene)
+    context = ExportContext(depsgraph, Scene())
+    view = read_view(region, space, context)
+    _look_through(result, view, export_view_film(context, view))
+    return result, view
+
+
+def _look_through(result: Scene, view: View, film: Film) -> None:
+    result.camera, result.film, result.origin = view.camera, film, view.origin
+
+
+def _is_shown(item: Any, space: Any) -> bool:
+    """Local views and local collections hide what is elsewhere."""
+    subject = item.parent if item.is_instance else item.object
+    return bool(subject.visible_in_viewport_get(space))
+
+
+def _warn_about_what_views_miss(context: ExportContext, space: Any) -> None:
+    shading = space.shading
+    if not (shading.use_scene_lights_render and shading.use_scene_world_render):
+        context.warn("Viewport Shading: Luch always shows the scene's own lights and world.")
+    if context.scene.render.use_motion_blur and context.view_layer.use_motion_blur:
+        context.warn("Motion blur is seen in final renders only: the viewport is sharp.")
 
 
 def _export_motion(context: ExportContext, cache: MeshCache, engine: Any, shutter: Shutter) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from luch.scene import Settings
+from luch.stopping import CUSTOM, UNLIMITED_SAMPLES
 
 from .. import command_line
 from ..report_job import folder_of
@@ -68,6 +69,26 @@ def export_settings(context: ExportContext) -> Settings:
     if scene.world is not None:
         settings.ao_distance = scene.world.light_settings.distance
     return replace(settings, **command_line.current())
+
+
+def export_view_settings(context: ExportContext) -> Settings:
+    """Of a 3D viewport: with limits of its own, and nothing that takes a pilot, a second render or another filter."""
+    scene = context.scene
+    settings = export_settings(context)
+    return replace(
+        settings,
+        samples=effective(scene, "preview_samples") or UNLIMITED_SAMPLES,
+        time_limit=scene.luch.preview_time_limit,
+        error_limit=scene.luch.preview_error_limit_percent / 100.0,
+        # Trials of several structures take longer than a view stays as it is.
+        accelerator="BVH" if settings.accelerator == "AUTO" else settings.accelerator,
+        quality=CUSTOM,
+        denoise=False,
+        verify=False,
+        mergeable=False,
+        first_sample=0,
+        samples_in_all=0,
+    )
 
 
 def report_of(scene: Any) -> str:

@@ -62,6 +62,18 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
         row.operator("luch.follow_cycles", text="", icon="LOOP_BACK")
 
 
+class LUCH_RENDER_PT_viewport(LuchPanel, bpy.types.Panel):
+    """What ends the picture of a 3D viewport."""
+
+    bl_label = "Viewport"
+    bl_parent_id = "LUCH_RENDER_PT_sampling"
+
+    def draw(self, context: Any) -> None:
+        names = ("preview_samples", "preview_time_limit", "preview_error_limit_percent")
+        draw_settings(self.layout, context.scene, *names)
+        self.layout.prop(context.scene.render, "preview_pixel_size")
+
+
 class LUCH_RENDER_PT_lights(LuchPanel, bpy.types.Panel):
     """How lights are chosen."""
 
@@ -191,6 +203,7 @@ class LUCH_VIEWLAYER_PT_passes_light(LuchPanel, bpy.types.Panel):
 
 CLASSES = (
     LUCH_RENDER_PT_sampling,
+    LUCH_RENDER_PT_viewport,
     LUCH_RENDER_PT_lights,
     LUCH_RENDER_PT_light_paths,
     LUCH_RENDER_PT_bias,

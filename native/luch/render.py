@@ -28,7 +28,7 @@ from luch.effects.removal import without
 from luch.merge import Sums
 from luch.scene import F32, Film, Scene, Settings
 from luch.stopping import CUSTOM, Stopping
-from luch.watching import watched
+from luch.watching import WATCH_SECONDS, watched
 
 # Steps grow until one takes about this long; longer steps show the picture too seldom.
 STEP_SECONDS = 4.0
@@ -121,8 +121,9 @@ class _Loop:
     """One render while it grows: steps, looks, and what ends it."""
 
     def __init__(self, renderer: Any, scene: Scene, settings: Settings, progress: Callable[[Progress], bool] | None,
-                 start: float) -> None:  # fmt: skip
+                 start: float, watch_seconds: float = WATCH_SECONDS) -> None:  # fmt: skip
         self.renderer, self.settings, self.progress, self.start = renderer, settings, progress, start
+        self.watch_seconds = watch_seconds
         self.curve = Curve()
         self.stopping = Stopping(max(1, settings.samples), settings.error_limit)
         self.done = 0
@@ -146,7 +147,7 @@ class _Loop:
         def goes_on() -> bool:
             return self.progress is None or self.progress(preparing(self.stopping.samples, self.start))
 
-        self.cancelled = not watched(self.renderer.prepare, self.renderer, goes_on)
+        self.cancelled = not watched(self.renderer.prepare, self.renderer, goes_on, watch_seconds=self.watch_seconds)
         self.prepared = time.perf_counter()
 
     def seconds_left(self) -> float:
@@ -172,7 +173,7 @@ class _Loop:
             return not (self.cancelled or self.timed_out)
 
         left = self.seconds_left if first > 0 else lambda: float("inf")
-        watched(self._work(count), self.renderer, goes_on, left)
+        watched(self._work(count), self.renderer, goes_on, left, self.watch_seconds)
         if self.cancelled or self.timed_out:
             return
         self.done += count
@@ -260,11 +261,14 @@ class _Loop:
         return "error" if self.stopping.reached else "time" if self.timed_out else "samples"
 
 
-def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) -> Result:
+def render(
+    scene: Scene, *, progress: Callable[[Progress], bool] | None = None, watch_seconds: float = WATCH_SECONDS
+) -> Result:
     """Renders ``scene`` as its settings say, until its samples, its time limit or the error asked for are reached.
 
-    progress is called about ten times a second and at the end of every step; returning False cancels,
-    and the film so far is returned (``Result.cancelled``). Raises ValueError for a scene that does not
+    progress is called every watch_seconds (luch.quality, denoise, verify: ten times a second) and at the end of every
+    step; returning False cancels, and the film so far is returned (``Result.cancelled``); what it raises ends the
+    render at once and comes out of here. Raises ValueError for a scene that does not
     fit together, naming the object, MemoryError with the bytes it would take where there are fewer,
     luch.cuda.DeviceError for a GPU that fails while it renders.
     """
@@ -292,7 +296,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None) 
     with memory.explained(traced), faults_told():
         renderer, warnings = _renderer_for(traced)
         memory.require(traced, renderer.stats()["film_pixel_bytes"] + memory.READ_PIXEL_BYTES)
-        loop = _Loop(renderer, scene, settings, progress, start)
+        loop = _Loop(renderer, scene, settings, progress, start, watch_seconds)
         loop.prepare()
         loop.run()
         passes = {name: np.asarray(image) for name, image in renderer.passes().items()}

@@ -31,8 +31,9 @@ def watched(
     renderer: Any,
     goes_on: Callable[[], bool],
     seconds_left: Callable[[], float] = lambda: float("inf"),
+    watch_seconds: float = WATCH_SECONDS,
 ) -> bool:
-    """Does `work` on a thread of its own and asks `goes_on` meanwhile, about ten times a second and again when no
+    """Does `work` on a thread of its own and asks `goes_on` meanwhile, every `watch_seconds` and again when no
     seconds are left; on the first no, cancels the renderer.
 
     Returns whether it ran to its end uncancelled. No thread outlives this call.
@@ -42,7 +43,7 @@ def watched(
     thread.start()
     try:
         while thread.is_alive():
-            thread.join(min(WATCH_SECONDS, max(SHORTEST_WATCH_SECONDS, seconds_left())))
+            thread.join(min(watch_seconds, max(SHORTEST_WATCH_SECONDS, seconds_left())))
             if thread.is_alive() and asked_to_go_on and not goes_on():
                 asked_to_go_on = False
                 renderer.cancel()
