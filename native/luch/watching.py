@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-# A call is watched this often: what a cancel waits for at most, beside one batch of paths.
+# A call is watched this often: what a cancel waits for at most, beside one round of a batch.
 WATCH_SECONDS = 0.1
 SHORTEST_WATCH_SECONDS = 0.002  # before a deadline
 

@@ -19,6 +19,7 @@ from luch.render import render as render_scene
 from luch.scene import Scene
 from numpy.typing import NDArray
 from support.blender import save_every_pass
+from support.endings import LATE_STAGES, STAGES
 from support.pictures import read_passes
 
 import addon
@@ -70,15 +71,6 @@ def raising(error: BaseException) -> Callable[..., Any]:
 
 
 # -- 1, 2: failed stages ----------------------------------------------------------------------------------------------
-
-STAGES = (
-    "addon.report.Reporter.__init__", "addon.report.Reporter.warn", "addon.export.scene.export_settings",
-    "addon.result.ResultWriter.__enter__", "luch.render.check_scene", "luch.render.effects_of",
-    "luch.render._renderer_for", "luch.render._Loop.prepare", "luch.render._Loop._step", "luch.render._Loop._look",
-    "luch.render.ledger.shares", "addon.report.Reporter.progress", "addon.result._fit",
-)  # fmt: skip
-# The result is delivered: what fails now is told, and Blender has a picture.
-LATE_STAGES = ("addon.report.Reporter.statistics", "addon.result.ResultWriter.stamp", "addon.report.record.line")
 
 
 @pytest.mark.promise(1)

@@ -16,9 +16,10 @@ const float* times_of(const std::vector<float>& times, int from) {
 
 }  // namespace
 
-Batch::Batch(const RenderScene& scene, const FilmView& film)
+Batch::Batch(const RenderScene& scene, const FilmView& film, const std::atomic<bool>& stop)
     : scene_(scene),
       writer_{film, counts_.refused},
+      stop_(stop),
       scratch_(std::make_unique<Scratch>()),
       registers_(scene.max_registers * SHADE_LANES) {
     paths_.resize(BATCH_PATHS);
@@ -81,7 +82,7 @@ void Batch::trace(const PixelBlock& block) {
     if (timed()) clock_.start();
     generate(block);
     const u32 rounds = most_rounds(scene_.limits);
-    for (u32 round = 0; ray_count_ > 0 && round < rounds; round++) {
+    for (u32 round = 0; ray_count_ > 0 && round < rounds && !stops(); round++) {
         next_count_ = 0;
         shadow_count_ = 0;
         traverse();
@@ -100,15 +101,36 @@ void Batch::trace(const PixelBlock& block) {
         std::swap(ray_time_, next_time_);
         ray_count_ = next_count_;
     }
+    if (stops()) undo(block.sample_count);
+}
+
+void Batch::keep_pixel(u32 pixel) {
+    const FilmSum* row = film_row(writer_.film, pixel);
+    before_.pixels.push_back(pixel);
+    before_.rows.insert(before_.rows.end(), row, row + writer_.film.layout.stride);
+}
+
+// Paths that were cut off would darken their pixels.
+void Batch::undo(u32 sample_count) {
+    const u32 stride = writer_.film.layout.stride;
+    for (size_t i = 0; i < before_.pixels.size(); i++) {
+        std::copy_n(before_.rows.data() + i * stride, stride, film_row(writer_.film, before_.pixels[i]));
+        writer_.film.sample_counts[before_.pixels[i]] -= sample_count;
+    }
+    counts_ = before_.counts;
+    writer_.clamped = before_.clamped, writer_.cut = before_.cut;
 }
 
 void Batch::generate(const PixelBlock& block) {
     ray_count_ = 0;
+    before_.pixels.clear(), before_.rows.clear();
+    before_.counts = counts_, before_.clamped = writer_.clamped, before_.cut = writer_.cut;
     for (int y = 0; y < block.height; y++) {
         for (int x = 0; x < block.width; x++) {
             if (!block.holds(x, y)) continue;
             u32 px = u32(block.x0 + x), py = u32(block.y0 + y);
             u32 row = film_pixel(writer_.film, px, py);
+            keep_pixel(row);
             if (is_mark(block.first_sample)) film_mark(writer_, row, block.first_sample);
             film_count_samples(writer_, row, block.sample_count);
             PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples);
@@ -235,6 +257,7 @@ void Batch::shade_hits() {
             if (!survives(scene_, writer_, paths_[ray_path_[k]], scene_.view.materials[m])) continue;
             chunk[count++] = k;
             if (count == SHADE_LANES) {
+                if (stops()) return;
                 shade_chunk(m, chunk, count);
                 charge_queue(chunk, count);
                 count = 0;
@@ -268,6 +291,7 @@ void Batch::trace_shadows() {
         if (shadow.casts) {
             if (blocked_[k] == BLOCKED_OPAQUE) continue;
             if (blocked_[k] == BLOCKED_MAYBE) {
+                if (stops()) return;
                 MediumStack* stack = scene_.has_media ? &shadow_media_[k] : nullptr;
                 charge_shadows(from, k);
                 through = walk_transparent(scene_, shadow_rays_[k], shadow, stack, one, one, scratch_->light_points,

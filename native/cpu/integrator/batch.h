@@ -1,6 +1,7 @@
 // One thread's batch of paths and the stages that move it on: generate, traverse, sort by material,
 // shade, shadow, accumulate. A batch lives in one core's second-level cache; all its memory is taken once.
 #pragma once
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -46,17 +47,21 @@ struct PixelBlock {
 
 class Batch {
  public:
-    Batch(const RenderScene& scene, const FilmView& film);
+    // stop: set from any thread, for good.
+    Batch(const RenderScene& scene, const FilmView& film, const std::atomic<bool>& stop);
     ~Batch();
 
     // Traces block.width * block.height * block.sample_count <= BATCH_PATHS paths to their ends, into the
-    // rows of the block's pixels.
+    // rows of the block's pixels. Told to stop, leaves them as they were: a batch may take seconds.
     void trace(const PixelBlock& block);
 
     BatchCounts counts() const;
 
  private:
     // batch.cpp: the wavefront
+    bool stops() const { return stop_.load(std::memory_order_relaxed); }
+    void keep_pixel(u32 pixel);
+    void undo(u32 sample_count);
     void generate(const PixelBlock& block);
     void generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count);
     void traverse();
@@ -110,8 +115,17 @@ class Batch {
 
     const RenderScene& scene_;
     FilmWriter writer_;
+    const std::atomic<bool>& stop_;
     BatchCounts counts_;
     PixelClock clock_;
+
+    // The film before this batch.
+    struct Before {
+        std::vector<u32> pixels;
+        std::vector<FilmSum> rows;
+        BatchCounts counts;
+        u64 clamped, cut;
+    } before_;
 
     std::vector<PathState> paths_;
     // Rays under way, compact: entry k belongs to path ray_path_[k]. `next_` is the following generation.

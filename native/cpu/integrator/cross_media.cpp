@@ -7,7 +7,7 @@
 namespace luch::cpu {
 
 void Batch::cross_media() {
-    for (int k = 0; k < ray_count_; k++) {
+    for (int k = 0; k < ray_count_ && !stops(); k++) {
         cross_media(k);
         charge_rays(k, k + 1);
     }

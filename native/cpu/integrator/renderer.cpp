@@ -103,7 +103,7 @@ void Renderer::build_all() {
     build_lights();
     stats_.lights_seconds = seconds_now() - start;
     for (unsigned worker = 0; worker < pool_.size() && !input_.for_device; worker++) {
-        batches_.push_back(std::make_unique<Batch>(scene_, film_.view()));
+        batches_.push_back(std::make_unique<Batch>(scene_, film_.view(), cancelled_));
     }
 }
 

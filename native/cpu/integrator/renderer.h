@@ -97,7 +97,7 @@ class Renderer {
     bool render_regions(const std::vector<u32>& begins, const std::vector<u32>& ends);
     size_t tile_count() const;
 
-    // From any thread, for good: render() returns within one batch's time, prepare() within one step of building.
+    // From any thread, for good: render() returns within a round of a batch, prepare() within one step of building.
     void cancel() {
         cancelled_.store(true, std::memory_order_relaxed);
         pool_.cancel();

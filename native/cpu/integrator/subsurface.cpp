@@ -29,7 +29,7 @@ void Batch::walk_subsurface() {
     LocalTracer tracer{*scene_.walk_trees, SHUTTER_MIDDLE};
     counts_.subsurface_walks += u64(walk_count_);
     int exits = 0;
-    for (int i = 0; i < walk_count_; i++) {
+    for (int i = 0; i < walk_count_ && !stops(); i++) {
         tracer.time = time_of(walks_[size_t(i)].ray);
         pass_inside(scene_.view, walks_[size_t(i)], tracer, &counts_.subsurface_steps);
         charge_queue(&walks_[size_t(i)].ray, 1);

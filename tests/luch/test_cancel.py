@@ -1,0 +1,54 @@
+"""A render that is told to stop while a batch of paths is under way: at once, and with whole samples alone."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+from luch import core
+from luch.scene import Scene
+from support.endings import veils
+
+SAMPLES = 8  # of a tile: a batch
+
+
+def small(scene: Scene, width: int) -> Scene:
+    """Tiles of 16 x 16 pixels in a row, whose Sample Count is kept."""
+    scene.film = replace(scene.film, width=width, height=16, passes=["Combined", "Sample Count"])
+    return scene
+
+
+def test_a_batch_that_takes_long_ends_where_it_is_and_leaves_no_trace() -> None:
+    renderer = core.render.Renderer(small(veils(count=100), 16))
+    renderer.prepare()
+    finished: list[bool] = []
+    work = threading.Thread(target=lambda: finished.append(renderer.render(0, SAMPLES)))
+    work.start()
+    time.sleep(0.02)
+    renderer.cancel()
+    work.join()
+    assert finished == [False]
+    passes = renderer.passes()
+    assert not passes["Sample Count"].any() and not passes["Combined"].any()
+    assert renderer.stats()["paths"] == 0
+
+
+def test_what_a_cancelled_render_has_drawn_is_what_it_would_have_drawn() -> None:
+    scene = small(veils(count=30), 64)
+    whole, cut = core.render.Renderer(scene), core.render.Renderer(scene)
+    for renderer in (whole, cut):
+        renderer.prepare()
+    assert whole.render(0, SAMPLES)
+    work = threading.Thread(target=lambda: cut.render(0, SAMPLES))
+    work.start()
+    while work.is_alive() and cut.step_progress() < 0.25:
+        time.sleep(0.001)
+    cut.cancel()
+    work.join()
+    counts = cut.passes()["Sample Count"][..., 0]
+    drawn = counts == SAMPLES
+    assert drawn.any() and not drawn.all() and not counts[~drawn].any()
+    expected, found = whole.passes()["Combined"], cut.passes()["Combined"]
+    assert np.array_equal(found[drawn], expected[drawn]) and not found[~drawn].any()
