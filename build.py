@@ -8,9 +8,11 @@ pinned in requirements.txt, compiles native/, and runs the rest there. `build.py
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 
 from buildtools import commands
+from buildtools.compile_core import levels
 from buildtools.failure import BuildFailure
 
 
@@ -22,7 +24,10 @@ def _parser() -> argparse.ArgumentParser:
 
     compiling = argparse.ArgumentParser(add_help=False)
     compiling.add_argument(
-        "--isa", default="v2;v3;v4", help="x86-64 levels to compile, e.g. v4 or 'v3;v4' (default: all three)"
+        "--isa",
+        default=os.environ.get("LUCH_ISAS", "v2;v3;v4"),
+        help="x86-64 levels to compile, e.g. v4 or 'v3;v4'; 'here': the plain one and this processor's best "
+        "(default: LUCH_ISAS of the environment, or all three)",
     )
     compiling.add_argument("--jobs", type=int, default=0, help="compiler processes at once (default: one per core)")
 
@@ -94,6 +99,8 @@ def main() -> int:
     if rest and not arguments.passes_on:
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     arguments.rest = rest
+    if "isa" in arguments:
+        arguments.isa = levels(arguments.isa)
     try:
         return int(arguments.run(arguments))
     except BuildFailure as failure:

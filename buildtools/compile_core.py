@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 from pathlib import Path
 from typing import List
@@ -22,6 +23,14 @@ def compile_core(isas: str = "v2;v3;v4", jobs: int = 0) -> None:
         # A core of an earlier, wider build would be loaded on another processor, and be of another version.
         if stale.name.split(".")[0] not in [f"_core_{isa}" for isa in isas.split(";")]:
             stale.unlink()
+
+
+def levels(isas: str) -> str:
+    """Semicolon-separated x86-64 levels; "here" is the plain one and the best one that this processor runs."""
+    if isas != "here":
+        return isas
+    best: str = runpy.run_path(str(NATIVE / "luch" / "_native.py"))["levels_here"]()[0]
+    return ";".join(sorted({"v2", best}))
 
 
 def compile_sanitized(jobs: int = 0) -> Path:

@@ -23,8 +23,8 @@ OLDEST = 75  # PTX for it runs on everything newer
 FUSES_BOXES = re.compile("CWBVH|TRACE_.*|RENDER_STAGES|RENDER_WALKS")
 # Where a walk is in doubt, its cells are found in double (accel/grid.h).
 WALKS_IN_DOUBLE = re.compile("(TRACE_)?(HIERARCHICAL_)?GRID")
-# The driver would compile them for minutes; luch.cuda.compiler has them compiled for the scene instead.
-NO_PTX = ("RENDER_STAGES",)
+# To machine code in minutes. Not by the driver of a user: luch.cuda.compiler has them compiled for the scene instead.
+MINUTES = ("RENDER_STAGES",)
 # Functions of rare effects, which modules that serve many scenes lack.
 OF_RARE = re.compile("closest_moving|any_moving|test_piece|eval_fibre|move_instance")
 SERVES_MANY = re.compile("TRACE_.*|RENDER_STAGES")
@@ -58,8 +58,8 @@ def _traced() -> Dict[str, str]:
 def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
     """PTX of every unit, and FOLDER/MODULE-PRECISION-sm_XX.cubin. None where no nvcc is. Raises BuildFailure.
 
-    everywhere: all units for all architectures; else those of the default precision, the others for the oldest and
-    the newest.
+    everywhere: all units for all architectures; else those of the default precision, the others and the general
+    stages, each minutes of one processor, for the oldest and the newest.
     """
     nvcc = shutil.which("nvcc")
     if nvcc is None:
@@ -83,7 +83,8 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
 
     def wanted(unit: Unit) -> List[int]:
         known: List[int] = table()["architectures"]
-        return known if everywhere or unit[1] == DEFAULT else [known[0], known[-1]]
+        every = everywhere or (unit[1] == DEFAULT and unit[0] not in MINUTES)
+        return known if every else [known[0], known[-1]]
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         failures = [text for text in pool.map(to_ptx, units()) if text]
@@ -151,7 +152,7 @@ def place_kernels() -> None:
         "print(json.dumps([ahead_name(*unit) for unit in json.loads(sys.argv[1])]))"
     )
     wanted = [(*unit, architecture) for unit in units() for architecture in table()["architectures"]]
-    wanted += [(*unit, 0) for unit in units() if unit[0] not in NO_PTX]
+    wanted += [(*unit, 0) for unit in units() if unit[0] not in MINUTES]
     names = output([str(VENV_PYTHON), "-c", code, json.dumps(wanted)])
     if names is None:
         raise BuildFailure("luch.cuda could not be imported from native/")

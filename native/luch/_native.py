@@ -31,10 +31,15 @@ def _processor_flags() -> set[str]:
     return set()
 
 
+def levels_here() -> list[str]:
+    """Those that this processor runs, the best first."""
+    flags = _processor_flags()
+    return [isa for isa, needs in _NEEDS.items() if needs <= flags]
+
+
 def _load() -> ModuleType:
     wished = os.environ.get("LUCH_ISA")
-    flags = _processor_flags()
-    levels = [wished] if wished else [isa for isa, needs in _NEEDS.items() if needs <= flags]
+    levels = [wished] if wished else levels_here()
     errors = []
     for isa in levels:
         try:
