@@ -138,6 +138,7 @@ def test_53_a_broken_texel_changes_no_other(value: float, device: str) -> None:
 
 
 @every_device
+@pytest.mark.promise(18)
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_non_finite_samples_are_counted_by_cause_and_kept_out(value: float, device: str) -> None:
     """A world whose strength is no number: what paths meet is refused, the floor's own light is kept."""
