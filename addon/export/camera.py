@@ -10,7 +10,16 @@ from luch.scene import F64, Camera
 
 from .context import ExportContext
 
-PANORAMAS = {"EQUIRECTANGULAR": "EQUIRECTANGULAR"}
+# Blender's names of panoramas -> Camera.kind.
+PANORAMAS = {
+    "EQUIRECTANGULAR": "EQUIRECTANGULAR",
+    "FISHEYE_EQUIDISTANT": "FISHEYE_EQUIDISTANT",
+    "FISHEYE_EQUISOLID": "FISHEYE_EQUISOLID",
+    "FISHEYE_LENS_POLYNOMIAL": "FISHEYE_POLYNOMIAL",
+    "MIRRORBALL": "MIRROR_BALL",
+    "EQUIANGULAR_CUBEMAP_FACE": "CUBE_FACE",
+    "CENTRAL_CYLINDRICAL": "CYLINDER",
+}
 
 
 def export_camera(subject: Any, context: ExportContext, engine: Any) -> Camera:
@@ -32,9 +41,8 @@ def export_camera(subject: Any, context: ExportContext, engine: Any) -> Camera:
         shift_y=data.shift_y,
         clip_start=data.clip_start,
         clip_end=data.clip_end,
-        latitude=(data.latitude_min, data.latitude_max),
-        longitude=(data.longitude_min, data.longitude_max),
     )
+    add_panorama(camera, data)
     _add_depth_of_field(camera, data.dof, context)
     return camera
 
@@ -47,6 +55,22 @@ def _kind(data: Any, context: ExportContext) -> str:
     name = data.panorama_type if data.type == "PANO" else data.type
     context.warn(f'Camera "{data.name}": type {name} is not supported and drawn as perspective.')
     return "PERSP"
+
+
+def add_panorama(camera: Camera, data: Any) -> None:
+    """What panoramas ask for."""
+    camera.latitude = (data.latitude_min, data.latitude_max)
+    camera.longitude = (data.longitude_min, data.longitude_max)
+    camera.fisheye_fov = data.fisheye_fov
+    camera.fisheye_lens_mm = data.fisheye_lens
+    k0, k1, k2, k3, k4 = (getattr(data, f"fisheye_polynomial_k{power}") for power in range(5))
+    camera.fisheye_polynomial = (k0, k1, k2, k3, k4)
+    camera.cylinder_angle = (data.central_cylindrical_range_u_min, data.central_cylindrical_range_u_max)
+    radius = max(data.central_cylindrical_radius, 1e-9)
+    camera.cylinder_height = (
+        data.central_cylindrical_range_v_min / radius,
+        data.central_cylindrical_range_v_max / radius,
+    )
 
 
 def camera_matrix(subject: Any) -> F64:

@@ -10,6 +10,8 @@ from luch import core
 from luch.scene import F32, Attribute, Mesh
 from numpy.typing import NDArray
 
+from .hashes import random_of
+
 ISLAND = "island_random"
 POINTINESS = "pointiness"
 
@@ -66,13 +68,17 @@ def property_color(owners: Iterable[Any], path: str) -> tuple[float, float, floa
 
 
 def object_attributes(wanted: Iterable[str], subject: Any, parent: Any) -> dict[str, tuple[float, float, float, float]]:
-    """What Attribute nodes read of an object ("object:NAME") or its instancer ("instancer:NAME")."""
+    """What Attribute nodes read of an object ("object:NAME") or its instancer ("instancer:NAME"); of an object that no
+    particle shows, what Particle Info reads ("particle:NAME")."""
     result = {}
     for wish in wanted:
         kind, _, path = wish.partition(":")
-        owners = {"object": (subject, subject.data), "instancer": (parent, subject, subject.data)}.get(kind)
-        if owners and path:
+        own = (subject, subject.data)
+        owners = {"object": own, "instancer": (parent, parent.data, *own), "particle": ()}.get(kind)
+        if owners is not None and path:
             result[wish] = property_color(owners, path) or (0.0, 0.0, 0.0, 0.0)
+        if wish == "particle:Random":  # what shows no particle counts as the first
+            result[wish] = (random_of(0),) * 4
     return result
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 from .cache import MeshCache
 from .context import ExportContext
 from .derived import object_attributes
+from .hashes import name_hash
 from .lights import export_light
 from .materials import MaterialTable
 from .motion import MotionRecorder
 from .particles import export_hair, hair_systems
+from .told import Instancers, told_wishes
 from .visibility import instance_visibility
 from .volumes import warn_about_smoke
 
@@ -70,6 +73,10 @@ class InstanceCollector:
         self._generated: list[float] = []  # 3 each
         self._uv: list[float] = []  # 2 each
         self._solid: bool = context.view_layer.use_solid
+        # Objects whose materials ask what an instancer tells each instance, and their likes with other values.
+        self._told: dict[int, list[str]] = {}
+        self._variants: dict[tuple[int, tuple[Any, ...]], int] = {}
+        self._instancers = Instancers(context.scene.frame_current_final)
 
     def add(self, item: Any) -> None:
         """One instance: a mesh or point cloud to draw, a lamp, or nothing for us."""
@@ -133,7 +140,19 @@ class InstanceCollector:
         index = self._objects.get(key)
         if index is None:
             index = self._objects[key] = self._add_object(subject, parent)
+        if is_instance and index in self._told:
+            index = self._variant(item, index)
         self._add_row(item, subject, parent, index)
+
+    def _variant(self, item: Any, index: int) -> int:
+        """The object with what its instancer tells this instance."""
+        told = self._instancers.tell(item, self._told[index])
+        key = (index, tuple(told.values()))
+        if key not in self._variants:
+            objects = self._context.result.objects
+            self._variants[key] = len(objects)
+            objects.append(replace(objects[index], attributes={**objects[index].attributes, **told}))
+        return self._variants[key]
 
     def add_hair(self, item: Any) -> None:
         """Particle hair of an instance: an object of its own for each system."""
@@ -198,7 +217,10 @@ class InstanceCollector:
             )
         )
         self._warn_about_what_is_missing(subject)
-        return len(result.objects) - 1
+        index = len(result.objects) - 1
+        if wishes := told_wishes(result.objects[index].attributes):
+            self._told[index] = wishes
+        return index
 
     def _hair_index(self, subject: Any, hair: tuple[Any, Any], slots: list[int]) -> int:
         mesh = export_hair(subject, *hair, self._materials.attributes(slots), self._context)
@@ -252,37 +274,3 @@ def asset_name(subject: Any) -> str:
     while subject.parent is not None:
         subject = subject.parent
     return str(subject.name)
-
-
-def name_hash(name: str) -> int:
-    """Random bits of an object that no instancer numbers, from its name: those that Blender users know from Cycles."""
-    value = 0
-    for byte in name.encode():
-        signed = byte - 256 if byte >= 128 else byte
-        value = (value * 37 + signed) & 0xFFFFFFFF
-    return _mix(value)
-
-
-def _mix(value: int) -> int:
-    """Bob Jenkins' final mix (lookup3, public domain) of one number and 0."""
-    mask = 0xFFFFFFFF
-
-    def rotate(x: int, bits: int) -> int:
-        return ((x << bits) | (x >> (32 - bits))) & mask
-
-    a = b = c = (0xDEADBEEF + (2 << 2) + 13) & mask
-    a = (a + value) & mask
-    c ^= b
-    c = (c - rotate(b, 14)) & mask
-    a ^= c
-    a = (a - rotate(c, 11)) & mask
-    b ^= a
-    b = (b - rotate(a, 25)) & mask
-    c ^= b
-    c = (c - rotate(b, 16)) & mask
-    a ^= c
-    a = (a - rotate(c, 4)) & mask
-    b ^= a
-    b = (b - rotate(a, 14)) & mask
-    c ^= b
-    return (c - rotate(b, 24)) & mask

@@ -1,6 +1,8 @@
 // Camera rays and the pixel filter over arrays, for tests and tools.
 #include "bindings/camera.h"
 
+#include <stdexcept>
+
 #include "bindings/bind.h"
 #include "cpu/filter.h"
 
@@ -65,7 +67,7 @@ cpu::CameraSpec read_camera(const py::handle& camera) {
     cpu::CameraSpec spec;
     read(camera, "kind", spec.kind);
     auto matrix = camera.attr("matrix").cast<py::array_t<double, py::array::c_style | py::array::forcecast>>();
-    if (matrix.size() != 12) throw py::value_error("Camera: matrix must have shape (3, 4)");
+    if (matrix.size() != 12) throw std::invalid_argument("Camera: its matrix must be (3, 4).");
     std::copy(matrix.data(), matrix.data() + 12, spec.matrix);
     read(camera, "lens_mm", spec.lens_mm);
     read(camera, "sensor_width_mm", spec.sensor_width_mm);
@@ -84,6 +86,13 @@ cpu::CameraSpec read_camera(const py::handle& camera) {
     read(camera, "aperture_ratio", spec.aperture_ratio);
     read_pair(camera, "latitude", spec.latitude);
     read_pair(camera, "longitude", spec.longitude);
+    read(camera, "fisheye_fov", spec.fisheye_fov);
+    read(camera, "fisheye_lens_mm", spec.fisheye_lens_mm);
+    py::sequence polynomial = camera.attr("fisheye_polynomial");
+    if (polynomial.size() != 5) throw py::value_error("Camera: fisheye_polynomial must have 5 coefficients");
+    for (size_t k = 0; k < 5; ++k) spec.fisheye_polynomial[k] = polynomial[k].cast<double>();
+    read_pair(camera, "cylinder_angle", spec.cylinder_angle);
+    read_pair(camera, "cylinder_height", spec.cylinder_height);
     return spec;
 }
 

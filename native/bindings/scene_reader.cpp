@@ -7,6 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "bindings/camera.h"
 #include "bindings/forced.h"
 #include "cpu/camera.h"
 #include "cpu/filter.h"
@@ -472,35 +473,8 @@ struct Reader {
     }
 
     void read_camera(const py::object& camera, const py::object& film) {
-        cpu::CameraSpec spec;
-        auto number = [&](const char* name) { return py::cast<double>(camera.attr(name)); };
-        spec.kind = py::cast<std::string>(camera.attr("kind"));
-        auto matrix = read_matrix(camera.attr("matrix"), "Camera");
-        std::copy(matrix.data(), matrix.data() + 12, spec.matrix);
-        spec.lens_mm = number("lens_mm");
-        spec.sensor_width_mm = number("sensor_width_mm");
-        spec.sensor_height_mm = number("sensor_height_mm");
-        spec.sensor_fit = py::cast<std::string>(camera.attr("sensor_fit"));
-        spec.ortho_scale = number("ortho_scale");
-        spec.shift_x = number("shift_x");
-        spec.shift_y = number("shift_y");
-        spec.clip_start = number("clip_start");
-        spec.clip_end = number("clip_end");
-        spec.use_dof = py::cast<bool>(camera.attr("use_dof"));
-        spec.focus_distance = number("focus_distance");
-        spec.fstop = number("fstop");
-        spec.blades = py::cast<int>(camera.attr("blades"));
-        spec.blades_rotation = number("blades_rotation");
-        spec.aperture_ratio = number("aperture_ratio");
-        auto latitude = py::cast<std::array<double, 2>>(camera.attr("latitude"));
-        auto longitude = py::cast<std::array<double, 2>>(camera.attr("longitude"));
-        std::copy(latitude.begin(), latitude.end(), spec.latitude);
-        std::copy(longitude.begin(), longitude.end(), spec.longitude);
-        cpu::FrameSpec frame;
-        frame.width = py::cast<int>(film.attr("width"));
-        frame.height = py::cast<int>(film.attr("height"));
-        auto aspect = py::cast<std::array<double, 2>>(film.attr("pixel_aspect"));
-        std::copy(aspect.begin(), aspect.end(), frame.pixel_aspect);
+        cpu::CameraSpec spec = bindings::read_camera(camera);
+        cpu::FrameSpec frame = read_frame(film);
         input.camera = cpu::make_camera_view(spec, frame, input.origin);
         read_camera_motion(camera.attr("motion"), spec, frame);
         input.frame_width = u32(frame.width);

@@ -26,6 +26,27 @@ Fit fit_sensor(const CameraSpec& camera, const FrameSpec& frame, CameraKind kind
     return {half, frame.height / aspect, static_cast<double>(frame.height)};
 }
 
+// Panoramas other than the equirectangular: a rectangle of the plane fills the frame, or the sensor does in millimetres.
+void set_panorama_map(const CameraSpec& camera, const FrameSpec& frame, CameraKind kind, double (&scale)[2],
+                      double (&centre)[2]) {
+    double low[2] = {-1.0, -1.0}, high[2] = {1.0, 1.0};
+    if (kind == CameraKind::CYLINDER) {
+        low[0] = camera.cylinder_angle[0], high[0] = camera.cylinder_angle[1];
+        low[1] = camera.cylinder_height[0], high[1] = camera.cylinder_height[1];
+    } else if (kind == CameraKind::FISHEYE_EQUISOLID || kind == CameraKind::FISHEYE_POLYNOMIAL) {
+        Fit fit = fit_sensor(camera, frame, CameraKind::ORTHOGRAPHIC);
+        double sensor = camera.sensor_fit == "VERTICAL" ? camera.sensor_height_mm : camera.sensor_width_mm;
+        high[0] = 0.5 * sensor * frame.width / fit.pixels_x, low[0] = -high[0];
+        high[1] = 0.5 * sensor * frame.height / fit.pixels_y, low[1] = -high[1];
+    }
+    double sides[2] = {static_cast<double>(frame.width), static_cast<double>(frame.height)};
+    double shifts[2] = {camera.shift_x, camera.shift_y};
+    for (int k = 0; k < 2; ++k) {
+        scale[k] = std::max(high[k] - low[k], 1e-9) / sides[k];
+        centre[k] = -low[k] / scale[k] - shifts[k] * sides[k];
+    }
+}
+
 void set_raster_map(CameraView& view, const CameraSpec& camera, const FrameSpec& frame) {
     double cx, cy, sx, sy;  // plane = (raster - centre) * scale
     if (view.kind == CameraKind::EQUIRECTANGULAR) {
@@ -34,6 +55,10 @@ void set_raster_map(CameraView& view, const CameraSpec& camera, const FrameSpec&
         sy = std::min(camera.latitude[0] - camera.latitude[1], -1e-9) / frame.height;
         cx = camera.longitude[0] / sx - camera.shift_x * frame.width;
         cy = (camera.latitude[0] - 1.5707963267948966) / sy - camera.shift_y * frame.height;
+    } else if (is_panorama(view.kind)) {
+        double scale[2], centre[2];
+        set_panorama_map(camera, frame, view.kind, scale, centre);
+        sx = scale[0], sy = scale[1], cx = centre[0], cy = centre[1];
     } else {
         Fit fit = fit_sensor(camera, frame, view.kind);
         sx = 2.0 * fit.half_length / fit.pixels_x;
@@ -57,7 +82,7 @@ void set_transforms(CameraView& view, const CameraSpec& camera, const double ori
         axis[k][1] = valid ? y / length : (k == 1);
         axis[k][2] = valid ? z / length : (k == 2);
     }
-    bool panorama = view.kind == CameraKind::EQUIRECTANGULAR;
+    bool panorama = is_panorama(view.kind);
     double m[12];
     for (int row = 0; row < 3; ++row) {
         double right = axis[0][row], up = axis[1][row], forward = -axis[2][row];
@@ -115,6 +140,35 @@ void set_lens(CameraView& view, const CameraSpec& camera) {
     view.inverse_focus = static_cast<float>(1.0 / std::max(camera.focus_distance, 1e-5));
 }
 
+void set_fisheye(CameraView& view, const CameraSpec& camera) {
+    view.fisheye.half_fov = static_cast<float>(0.5 * camera.fisheye_fov);
+    view.fisheye.lens_mm = static_cast<float>(std::max(camera.fisheye_lens_mm, 1e-6));
+    for (int k = 0; k < 5; ++k) view.fisheye.k[k] = static_cast<float>(camera.fisheye_polynomial[k]);
+}
+
+struct KindName {
+    const char* name;
+    CameraKind kind;
+};
+constexpr KindName KINDS[] = {{"PERSP", CameraKind::PERSPECTIVE},
+                              {"ORTHO", CameraKind::ORTHOGRAPHIC},
+                              {"EQUIRECTANGULAR", CameraKind::EQUIRECTANGULAR},
+                              {"FISHEYE_EQUIDISTANT", CameraKind::FISHEYE_EQUIDISTANT},
+                              {"FISHEYE_EQUISOLID", CameraKind::FISHEYE_EQUISOLID},
+                              {"FISHEYE_POLYNOMIAL", CameraKind::FISHEYE_POLYNOMIAL},
+                              {"MIRROR_BALL", CameraKind::MIRROR_BALL},
+                              {"CUBE_FACE", CameraKind::CUBE_FACE},
+                              {"CYLINDER", CameraKind::CYLINDER}};
+
+CameraKind kind_of(const std::string& name) {
+    std::string known;
+    for (const KindName& entry : KINDS) {
+        if (name == entry.name) return entry.kind;
+        known += (known.empty() ? "" : ", ") + std::string(entry.name);
+    }
+    throw std::invalid_argument("Camera: kind \"" + name + "\" is unknown. Use one of " + known + ".");
+}
+
 }  // namespace
 
 CameraView make_camera_view(const CameraSpec& camera, const FrameSpec& frame, const double origin[3]) {
@@ -124,16 +178,8 @@ CameraView make_camera_view(const CameraSpec& camera, const FrameSpec& frame, co
     if (!(frame.pixel_aspect[0] > 0.0 && frame.pixel_aspect[1] > 0.0))
         throw std::invalid_argument("Film: pixel_aspect must be positive.");
     CameraView view{};
-    if (camera.kind == "PERSP") {
-        view.kind = CameraKind::PERSPECTIVE;
-    } else if (camera.kind == "ORTHO") {
-        view.kind = CameraKind::ORTHOGRAPHIC;
-    } else if (camera.kind == "EQUIRECTANGULAR") {
-        view.kind = CameraKind::EQUIRECTANGULAR;
-    } else {
-        throw std::invalid_argument("Camera: kind \"" + camera.kind +
-                                    "\" is unknown. Use PERSP, ORTHO or EQUIRECTANGULAR.");
-    }
+    view.kind = kind_of(camera.kind);
+    set_fisheye(view, camera);
     set_transforms(view, camera, origin);
     set_raster_map(view, camera, frame);
     set_clipping(view, camera);

@@ -20,6 +20,10 @@ struct CameraSpec {
     double blades_rotation = 0.0, aperture_ratio = 1.0;
     double latitude[2] = {-1.5707963267948966, 1.5707963267948966};
     double longitude[2] = {-3.141592653589793, 3.141592653589793};
+    double fisheye_fov = 3.141592653589793, fisheye_lens_mm = 10.5;
+    double fisheye_polynomial[5] = {0.0, 0.0, 0.0, 0.0, 0.0};  // angle = -(k0 + k1 r + ... k4 r^4), r in mm
+    double cylinder_angle[2] = {-3.141592653589793, 3.141592653589793};
+    double cylinder_height[2] = {-1.0, 1.0};  // on a cylinder of radius 1
 };
 
 // The full frame, in pixels.

@@ -226,9 +226,20 @@ class CameraMotion:
     lens_mm: tuple[float, float] | None = None  # when the shutter opens and when it closes; None: does not change
 
 
+PANORAMAS = (  # geometry of each: native/include/luch/camera/panorama.h
+    "EQUIRECTANGULAR",
+    "FISHEYE_EQUIDISTANT",
+    "FISHEYE_EQUISOLID",
+    "FISHEYE_POLYNOMIAL",
+    "MIRROR_BALL",
+    "CUBE_FACE",
+    "CYLINDER",
+)
+
+
 @dataclass
 class Camera:
-    kind: str = "PERSP"  # "PERSP", "ORTHO", "EQUIRECTANGULAR"
+    kind: str = "PERSP"  # "PERSP", "ORTHO" or one of PANORAMAS
     matrix: F64 = field(default_factory=_identity)  # (3, 4) camera to world, looks along -Z, Y up
     lens_mm: float = 50.0
     sensor_width_mm: float = 36.0
@@ -247,6 +258,11 @@ class Camera:
     aperture_ratio: float = 1.0
     latitude: tuple[float, float] = (-1.5707964, 1.5707964)
     longitude: tuple[float, float] = (-3.1415927, 3.1415927)
+    fisheye_fov: float = 3.1415927  # of all fisheyes, radians
+    fisheye_lens_mm: float = 10.5  # FISHEYE_EQUISOLID
+    fisheye_polynomial: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)  # panorama.h, r in mm
+    cylinder_angle: tuple[float, float] = (-3.1415927, 3.1415927)  # CYLINDER, left to right
+    cylinder_height: tuple[float, float] = (-1.0, 1.0)  # on a cylinder of radius 1
     motion: CameraMotion | None = None  # None: stands still. matrix and lens are those of the shutter's middle
 
 

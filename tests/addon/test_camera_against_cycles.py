@@ -12,6 +12,8 @@ from luch.scene import Camera, Film
 from numpy.typing import NDArray
 from support.blender import save_every_pass
 
+from addon.export.camera import PANORAMAS, add_panorama
+
 bpy = pytest.importorskip("bpy")
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -73,7 +75,7 @@ def centres() -> NDArray[np.float32]:
 
 def luch_camera(scene: Any) -> tuple[Camera, Film]:
     data = scene.camera.data
-    kind = {"PERSP": "PERSP", "ORTHO": "ORTHO", "PANO": "EQUIRECTANGULAR"}[data.type]
+    kind = PANORAMAS[data.panorama_type] if data.type == "PANO" else data.type
     camera = Camera(
         kind=kind,
         matrix=np.array(scene.camera.matrix_world)[:3],
@@ -92,9 +94,8 @@ def luch_camera(scene: Any) -> tuple[Camera, Film]:
         blades=data.dof.aperture_blades,
         blades_rotation=data.dof.aperture_rotation,
         aperture_ratio=data.dof.aperture_ratio,
-        latitude=(data.latitude_min, data.latitude_max),
-        longitude=(data.longitude_min, data.longitude_max),
     )
+    add_panorama(camera, data)
     render = scene.render
     return camera, Film(width=WIDTH, height=HEIGHT, pixel_aspect=(render.pixel_aspect_x, render.pixel_aspect_y))
 
@@ -129,6 +130,40 @@ CASES: dict[str, dict[str, Any]] = {
         "latitude_min": -1.2,
         "latitude_max": 1.2,
     },
+    "evenly spaced fisheye": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": 4.0},
+    "fisheye of equal areas": {
+        "type": "PANO",
+        "panorama_type": "FISHEYE_EQUISOLID",
+        "fisheye_lens": 9.0,
+        "fisheye_fov": 2.7,
+        "shift_x": 0.1,
+        "shift_y": -0.05,
+    },
+    "fisheye of equal areas, tall pixel": {
+        "type": "PANO",
+        "panorama_type": "FISHEYE_EQUISOLID",
+        "sensor_fit": "VERTICAL",
+        "sensor_height": 30.0,
+        "pixel_aspect_y": 1.5,
+    },
+    "calibrated fisheye": {
+        "type": "PANO",
+        "panorama_type": "FISHEYE_LENS_POLYNOMIAL",
+        "fisheye_fov": 1.2,
+        "fisheye_polynomial_k1": -0.03,
+        "fisheye_polynomial_k2": -2e-4,
+    },
+    "polished ball": {"type": "PANO", "panorama_type": "MIRRORBALL"},
+    "face of a cube": {"type": "PANO", "panorama_type": "EQUIANGULAR_CUBEMAP_FACE", "shift_x": 0.1},
+    "cylinder": {
+        "type": "PANO",
+        "panorama_type": "CENTRAL_CYLINDRICAL",
+        "central_cylindrical_range_u_min": -2.0,
+        "central_cylindrical_range_u_max": 1.5,
+        "central_cylindrical_range_v_min": -0.7,
+        "central_cylindrical_range_v_max": 1.2,
+        "central_cylindrical_radius": 1.3,
+    },
 }
 DEFAULTS: dict[str, Any] = {
     "type": "PERSP",
@@ -145,6 +180,8 @@ DEFAULTS: dict[str, Any] = {
     "longitude_max": np.pi,
     "clip_start": 0.1,
     "clip_end": 1000.0,
+    "panorama_type": "EQUIRECTANGULAR",
+    "fisheye_fov": np.pi,
     "pixel_aspect_x": 1.0,
     "pixel_aspect_y": 1.0,
 }
@@ -155,7 +192,6 @@ def set_camera(scene: Any, settings: dict[str, Any]) -> None:
     scene.render.resolution_percentage = 100
     data = scene.camera.data
     data.dof.use_dof = False
-    data.panorama_type = "EQUIRECTANGULAR"
     for name, value in {**DEFAULTS, **settings}.items():
         setattr(scene.render if name.startswith("pixel_aspect") else data, name, value)
     bpy.context.view_layer.update()
@@ -167,6 +203,9 @@ def test_cycles_sees_the_point_on_our_ray(name: str, scene: Any, tmp_path: Path)
     positions = render_positions(scene, tmp_path)
     camera, film = luch_camera(scene)
     rays = core.camera.rays(camera, film, centres(), np.zeros((WIDTH * HEIGHT, 2), np.float32)).astype(np.float64)
+    seen = rays[:, 7] >= 0.0  # beside a fisheye's circle there is nothing
+    assert ((positions != 0.0).any(axis=1) == seen).all()
+    rays, positions = rays[seen], positions[seen]
     origin, direction, footprint, spread = rays[:, 0:3], rays[:, 3:6], rays[:, 8], rays[:, 9]
     t = np.einsum("ij,ij->i", positions - origin, direction)
     beside = np.linalg.norm(positions - origin - t[:, None] * direction, axis=1)
@@ -175,7 +214,7 @@ def test_cycles_sees_the_point_on_our_ray(name: str, scene: Any, tmp_path: Path)
     print(f"{name}: Cycles' points lie at most {pixels.max():.4f} pixels beside our rays")
     assert (t > 0).all()
     assert pixels.max() < 0.035
-    off = np.abs(core.camera.project(camera, film, positions)[:, :2] - centres())
+    off = np.abs(core.camera.project(camera, film, positions)[:, :2] - centres()[seen])
     if name == "panorama, shifted":  # a full turn further is the same direction
         off[:, 0] = np.minimum(off[:, 0], np.abs(off[:, 0] - WIDTH))
     assert off.max() < 0.03

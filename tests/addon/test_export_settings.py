@@ -71,12 +71,11 @@ def test_focus_on_an_object_is_its_depth_along_the_view(scene: bpy.types.Scene) 
 
 def test_an_unsupported_camera_is_named(scene: bpy.types.Scene) -> None:
     camera = add_camera(scene)
-    camera.data.type = "PANO"
-    camera.data.panorama_type = "MIRRORBALL"
+    camera.data.type = "CUSTOM"
     result = export()
     assert result.camera.kind == "PERSP"
-    assert "MIRRORBALL" in result.warnings[0]
-    camera.data.panorama_type = "EQUIRECTANGULAR"
+    assert "CUSTOM" in result.warnings[0]
+    camera.data.type, camera.data.panorama_type = "PANO", "EQUIRECTANGULAR"
     assert export().camera.kind == "EQUIRECTANGULAR"
 
 

@@ -13,6 +13,7 @@ from ..curves import RANDOM
 from .tree import Compiler, closure_emitter
 
 _SUBSURFACE = {"RANDOM_WALK": 0, "RANDOM_WALK_SKIN": 1, "RANDOM_WALK_LEGACY": 2, "BURLEY": 3}  # SubsurfaceMethod, there
+_BUMP_CORRECTION, _OWN_NORMAL = 1, 2  # bits of a lobe's first word: shade/nodes/closures.h
 _MICROFACETS = {"GGX": 0, "BECKMANN": 1, "MULTI_GGX": 2, "ASHIKHMIN_SHIRLEY": 3}  # Microfacets of bsdf/params.h
 
 
@@ -27,8 +28,11 @@ def _tangent(c: Compiler, node: bpy.types.Node, anisotropy: Value) -> Vector:
     return c.vector_or(node, "Tangent", lambda: c.builder.op3("TANGENT_RADIAL", (), (0, 0, 3)))
 
 
-def _params(c: Compiler, *words: int) -> tuple[int, ...]:
-    return (int(c.bump_correction), *words)
+def _params(c: Compiler, node: bpy.types.Node, *words: int) -> tuple[int, ...]:
+    """What the closure's normal is, and its other words. The normal of a displacement that is shown as bump is the
+    surface's own: light that meets it is not softened as on a Bump node's."""
+    own = c.surface_normal is not None and not c.is_linked(node, "Normal")
+    return (_BUMP_CORRECTION * c.bump_correction | _OWN_NORMAL * own, *words)
 
 
 @closure_emitter("ShaderNodeEmission", "ShaderNodeBackground")
@@ -71,27 +75,27 @@ def add_shader(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
 def diffuse(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Diffuse: Lambert, Oren-Nayar where it is rough."""
     inputs = (*c.color(node, "Color"), c.float(node, "Roughness"), *_normal(c, node))
-    c.builder.closure("CLOSURE_DIFFUSE", weight, inputs, _params(c))
+    c.builder.closure("CLOSURE_DIFFUSE", weight, inputs, _params(c, node))
 
 
 @closure_emitter("ShaderNodeBsdfTranslucent")
 def translucent(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Translucent: diffuse to the other side."""
-    c.builder.closure("CLOSURE_TRANSLUCENT", weight, (*c.color(node, "Color"), *_normal(c, node)), _params(c))
+    c.builder.closure("CLOSURE_TRANSLUCENT", weight, (*c.color(node, "Color"), *_normal(c, node)), _params(c, node))
 
 
 @closure_emitter("ShaderNodeBsdfSheen")
 def sheen(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Sheen: microfibre, or Ashikhmin's velvet."""
     inputs = (*c.color(node, "Color"), c.float(node, "Roughness"), *_normal(c, node))
-    c.builder.closure("CLOSURE_SHEEN", weight, inputs, _params(c, int(node.distribution == "ASHIKHMIN")))
+    c.builder.closure("CLOSURE_SHEEN", weight, inputs, _params(c, node, int(node.distribution == "ASHIKHMIN")))
 
 
 @closure_emitter("ShaderNodeBsdfToon")
 def toon(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Toon: diffuse or glossy."""
     inputs = (*c.color(node, "Color"), c.float(node, "Size"), c.float(node, "Smooth"), *_normal(c, node))
-    c.builder.closure("CLOSURE_TOON", weight, inputs, _params(c, int(node.component == "GLOSSY")))
+    c.builder.closure("CLOSURE_TOON", weight, inputs, _params(c, node, int(node.component == "GLOSSY")))
 
 
 @closure_emitter("ShaderNodeBsdfAnisotropic")
@@ -100,7 +104,7 @@ def glossy(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     anisotropy = c.float(node, "Anisotropy")
     scalars = (c.float(node, "Roughness"), anisotropy, c.float(node, "Rotation"))
     inputs = (*c.color(node, "Color"), *scalars, *_normal(c, node), *_tangent(c, node, anisotropy))
-    c.builder.closure("CLOSURE_GLOSSY", weight, inputs, _params(c, _MICROFACETS[node.distribution]))
+    c.builder.closure("CLOSURE_GLOSSY", weight, inputs, _params(c, node, _MICROFACETS[node.distribution]))
 
 
 @closure_emitter("ShaderNodeBsdfMetallic")
@@ -112,7 +116,7 @@ def metallic(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     film = (c.float(node, "Thin Film Thickness"), c.float(node, "Thin Film IOR"))
     inputs = (*colors, *scalars, *_normal(c, node), *_tangent(c, node, anisotropy), *film)
     physical = int(node.fresnel_type == "PHYSICAL_CONDUCTOR")
-    c.builder.closure("CLOSURE_METALLIC", weight, inputs, _params(c, _MICROFACETS[node.distribution], physical))
+    c.builder.closure("CLOSURE_METALLIC", weight, inputs, _params(c, node, _MICROFACETS[node.distribution], physical))
 
 
 @closure_emitter("ShaderNodeBsdfGlass")
@@ -121,14 +125,14 @@ def glass(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     film = (c.float(node, "Thin Film Thickness"), c.float(node, "Thin Film IOR"))
     scalars = (c.float(node, "Roughness"), c.float(node, "IOR"))
     inputs = (*c.color(node, "Color"), *scalars, *_normal(c, node), *film)
-    c.builder.closure("CLOSURE_GLASS", weight, inputs, _params(c, _MICROFACETS[node.distribution]))
+    c.builder.closure("CLOSURE_GLASS", weight, inputs, _params(c, node, _MICROFACETS[node.distribution]))
 
 
 @closure_emitter("ShaderNodeBsdfRefraction")
 def refraction(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     """Refraction."""
     inputs = (*c.color(node, "Color"), c.float(node, "Roughness"), c.float(node, "IOR"), *_normal(c, node))
-    c.builder.closure("CLOSURE_REFRACTION", weight, inputs, _params(c, _MICROFACETS[node.distribution]))
+    c.builder.closure("CLOSURE_REFRACTION", weight, inputs, _params(c, node, _MICROFACETS[node.distribution]))
 
 
 @closure_emitter("ShaderNodeBsdfPrincipled")
@@ -147,7 +151,7 @@ def principled(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     emits = any(b.known(value) != 0.0 for value in glow)
     thin_wall, transmission = c.float(node, "Thin Wall"), c.float(node, "Transmission Weight")
     lets_through = b.known(thin_wall) != 0.0 and b.known(transmission) != 0.0
-    params = _params(c, int(node.distribution == "MULTI_GGX"), int(emits), int(lets_through))
+    params = _params(c, node, int(node.distribution == "MULTI_GGX"), int(emits), int(lets_through))
     inputs = _principled_inputs(c, node, thin_wall, glow)
     radius = _subsurface_radius(c, node, "Subsurface Radius", "Subsurface Scale")
     walks = b.known(thin_wall) in (None, 0.0) and b.known(c.float(node, "Subsurface Weight")) != 0.0
@@ -201,11 +205,11 @@ def subsurface(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     color, radius = c.color(node, "Color"), _subsurface_radius(c, node, "Radius", "Scale")
     if c.builder.known_vector(radius) == (0.0, 0.0, 0.0):
         smooth = c.builder.constant(0.0)
-        c.builder.closure("CLOSURE_DIFFUSE", weight, (*color, smooth, *_normal(c, node)), _params(c))
+        c.builder.closure("CLOSURE_DIFFUSE", weight, (*color, smooth, *_normal(c, node)), _params(c, node))
         return
     scalars = (c.float(node, "IOR"), c.float(node, "Roughness"), c.float(node, "Anisotropy"))
     inputs = (*color, *radius, *scalars, *_normal(c, node))
-    c.builder.closure("CLOSURE_SUBSURFACE", weight, inputs, _params(c, _SUBSURFACE[node.falloff]))
+    c.builder.closure("CLOSURE_SUBSURFACE", weight, inputs, _params(c, node, _SUBSURFACE[node.falloff]))
 
 
 @closure_emitter("ShaderNodeBsdfHair")
@@ -214,7 +218,7 @@ def hair(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
     tangent = c.vector(node, "Tangent") if c.is_linked(node, "Tangent") else c.builder.vector(0.0, 0.0, 0.0)
     scalars = (c.float(node, "Offset"), c.float(node, "RoughnessU"), c.float(node, "RoughnessV"))
     inputs = (*c.color(node, "Color"), *scalars, *tangent)
-    c.builder.closure("CLOSURE_HAIR", weight, inputs, _params(c, int(node.component == "Transmission")))
+    c.builder.closure("CLOSURE_HAIR", weight, inputs, _params(c, node, int(node.component == "Transmission")))
 
 
 # As HairColor of luch/bsdf/setup_hair.h.
@@ -247,7 +251,7 @@ def principled_hair(c: Compiler, node: bpy.types.Node, weight: Vector) -> None:
         *scalars("Coat", "IOR", "Offset", "Random Color", "Random Roughness"),
         random,
     ]
-    c.builder.closure("CLOSURE_PRINCIPLED_HAIR", weight, inputs, _params(c, _HAIR_COLORS[node.parametrization]))
+    c.builder.closure("CLOSURE_PRINCIPLED_HAIR", weight, inputs, _params(c, node, _HAIR_COLORS[node.parametrization]))
 
 
 @closure_emitter("ShaderNodeBsdfRayPortal")

@@ -14,6 +14,7 @@ from luch.shader import ATTRIBUTE_COLOR, ATTRIBUTE_UV, Value, Vector, float_word
 
 from ..curves import INTERCEPT, LENGTH, RANDOM
 from ..derived import ISLAND, POINTINESS, property_color
+from ..told import PARTICLE
 from .tree import Compiler, Outputs, emitter
 
 # PathFlag of shade/point.h
@@ -145,8 +146,6 @@ def attribute(c: Compiler, node: bpy.types.Node) -> Outputs:
     if kind == "GEOMETRY":
         values = b.op("ATTRIBUTE_VALUE", (), (*c.offset_params(), b.attribute(name)))
     else:
-        if kind == "INSTANCER":
-            c.warn(node, "reads the instancer object's properties only, not what geometry nodes store per instance")
         values = b.op("ATTRIBUTE_OBJECT", (), (b.attribute(f"{kind.lower()}:{name}"),))
     x, y, z, factor, alpha_value = values
     return {"Color": (x, y, z), "Vector": (x, y, z), "Fac": factor, "Alpha": alpha_value}
@@ -271,9 +270,21 @@ def curves_info(c: Compiler, node: bpy.types.Node) -> Outputs:
     }
 
 
-@emitter("ShaderNodeParticleInfo", "ShaderNodeVolumeInfo")
+@emitter("ShaderNodeParticleInfo")
+def particle_info(c: Compiler, node: bpy.types.Node) -> Outputs:
+    """Particle Info: of the particle that shows this object."""
+    outputs: Outputs = {}
+    for socket in node.outputs:
+        if not c.output_used(node, socket.identifier):
+            continue
+        x, y, z, *_ = c.builder.op("ATTRIBUTE_OBJECT", (), (c.builder.attribute(PARTICLE + socket.name),))
+        outputs[socket.identifier] = (x, y, z) if socket.type == "VECTOR" else x
+    return outputs
+
+
+@emitter("ShaderNodeVolumeInfo")
 def no_such_geometry(c: Compiler, node: bpy.types.Node) -> Outputs:
-    """Particle and Volume Info on a mesh: zero, as in Cycles."""
+    """Volume Info on a mesh: zero, as in Cycles."""
     return {
         socket.identifier: c.builder.vector(0.0, 0.0, 0.0)
         if socket.type in ("VECTOR", "RGBA")

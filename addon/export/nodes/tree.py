@@ -109,23 +109,23 @@ class Compiler:
 
     def is_linked(self, node: bpy.types.Node, identifier: str) -> bool:
         """Whether something feeds the input."""
-        return (node.name, identifier) in self._links
+        return self._link(node, identifier) is not None
 
     def source(self, node: bpy.types.Node, identifier: str) -> bpy.types.Node | None:
         """The node that feeds the input; None if nothing does."""
-        link = self._links.get((node.name, identifier))
+        link = self._link(node, identifier)
         return link.from_node if link is not None else None
 
     def float(self, node: bpy.types.Node, identifier: str) -> Value:
         """Input as one float: a colour gives its luminance, a vector its mean."""
-        link = self._links.get((node.name, identifier))
+        link = self._link(node, identifier)
         if link is None:
             return self._default(node, identifier)[0]
         return self._to_float(self._follow(link), link.from_socket.type)
 
     def vector(self, node: bpy.types.Node, identifier: str) -> Vector:
         """Input as three floats: a float is repeated."""
-        link = self._links.get((node.name, identifier))
+        link = self._link(node, identifier)
         if link is None:
             default = self._default(node, identifier)
             return (default * 3)[:3] if len(default) == 1 else default[:3]  # type: ignore[return-value]
@@ -141,7 +141,7 @@ class Compiler:
 
     def closure(self, node: bpy.types.Node, identifier: str, weight: Vector) -> None:
         """Adds the closures that feed the input, times weight. Nothing linked: black."""
-        link = self._links.get((node.name, identifier))
+        link = self._link(node, identifier)
         if link is None or all(self.builder.known(value) == 0.0 for value in weight):
             return
         source = link.from_node
@@ -195,6 +195,14 @@ class Compiler:
             self.context.warn(f'{self.owner}: node "{label}" {fact}.', effect)
 
     # -- inside -------------------------------------------------------------------------------
+
+    def _link(self, node: bpy.types.Node, identifier: str) -> bpy.types.NodeLink | None:
+        """What feeds an input. A node that is not known feeds nothing: the input's own value counts, as in Cycles."""
+        link = self._links.get((node.name, identifier))
+        if link is None or link.from_node.bl_idname in EMITTERS or link.from_node.bl_idname in CLOSURE_EMITTERS:
+            return link
+        self.warn(link.from_node, "is not supported; the input that it feeds keeps its own value")
+        return None
 
     def _follow(self, link: bpy.types.NodeLink) -> Output:
         node, identifier = link.from_node, link.from_socket.identifier

@@ -6,7 +6,7 @@ from luch.effects.shown import Shown
 from luch.effects.surfaces import facts
 from luch.effects.table import Effects
 from luch.effects.volumes import add_volume_bounces
-from luch.scene import Film, Mesh
+from luch.scene import PANORAMAS, Film, Mesh
 
 _SUM_BYTES = 8  # a number of the film is a double
 # Pass -> numbers of its own that a pixel keeps.
@@ -47,7 +47,7 @@ def add_camera(effects: Effects, shown: Shown) -> None:
     none = "the aperture is round" if camera.use_dof else "there is no depth of field"
     on = camera.use_dof and polygon
     effects.add("Camera", "aperture blades", on, f"{camera.blades} blades" if on else none)
-    panorama = camera.kind == "EQUIRECTANGULAR"
+    panorama = camera.kind in PANORAMAS
     kind = {"PERSP": "perspective", "ORTHO": "orthographic"}.get(camera.kind, camera.kind)
     reason = "the camera sees all around" if panorama else f"the camera is {kind}"
     effects.add("Camera", "panorama", panorama, reason)

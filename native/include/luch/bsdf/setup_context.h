@@ -15,6 +15,7 @@ struct SetupContext {
     bool caustics_reflective = true;  // the scene's switches; they matter after a diffuse bounce
     bool caustics_refractive = true;
     bool bump_correction = true;      // the material's Bump Map Correction
+    bool own_normal = false;          // normals are the surface's own (displacement shown as bump): no bump on it
     float subsurface_min_radius = 0.0f;  // metres; what scatters over less is diffuse (bsdf/subsurface.h)
 };
 
@@ -44,7 +45,7 @@ LUCH_FN bool start_lobe(Lobe& lobe, LobeType type, Color weight, Vec3 normal, co
     lobe.type = type;
     lobe.fresnel = Fresnel::NONE_;
     lobe.distribution = Distribution::GGX;
-    bool bumped = normal.x != c.n.x || normal.y != c.n.y || normal.z != c.n.z;
+    bool bumped = !c.own_normal && (normal.x != c.n.x || normal.y != c.n.y || normal.z != c.n.z);
     u32 flags = !bumped ? 0u : (c.bump_correction ? LOBE_BUMPED | LOBE_SOFTENED : u32(LOBE_BUMPED));
     lobe.flags = static_cast<u8>(flags);
     lobe.normal = normal;

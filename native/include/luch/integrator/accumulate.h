@@ -116,8 +116,9 @@ LUCH_FN void write_aovs(FilmWriter& writer, const PathState& path, const float* 
     if (!(path.flags & PATH_THROUGH_FILM) || (path.flags & PATH_DATA_DONE)) return;
     for (u32 i = 0; i < writer.film.layout.aov_count; i++) {
         const float* value = aovs + u64(i) * 4u;
-        // A value AOV writes its one float; what lies beside it is never read.
-        film_add_aov_color(writer, path.pixel, i, Color{value[0], value[1], value[2]}, 1.0f);
+        // Alpha is 1 where the surface has an AOV Output. A value AOV writes its one float; what lies beside it is never
+        // read.
+        film_add_aov_color(writer, path.pixel, i, Color{value[0], value[1], value[2]}, value[3]);
     }
 }
 

@@ -42,6 +42,11 @@ LUCH_FN Ray begin_path(const RenderView& scene, const FilmView& film, u32 px, u3
     path.mis_origin = camera.ray.origin;
     path.footprint = camera.footprint;
     path.spread = camera.spread;
+    if (camera.ray.t_max < 0.0f) {  // beside a fisheye's circle: black and opaque, as in Cycles
+        path.throughput = path.feature_throughput = make_vec3(0.0f);
+        path.flags &= ~u32(PATH_THROUGH_FILM | PATH_FEATURES);
+        path.visibility = 0u;
+    }
     return camera.ray;
 }
 

@@ -18,7 +18,10 @@ struct InputReader {
     }
 };
 
-LUCH_FN SetupContext setup_context(const OpContext& c, bool bump_correction) {
+// Bits of a lobe's params[0].
+inline constexpr u32 BUMP_CORRECTION = 1u, OWN_NORMAL = 2u;  // SetupContext
+
+LUCH_FN SetupContext setup_context(const OpContext& c, u32 normals) {
     SetupContext s;
     s.n = normal_at(c);
     s.ng = geometric_normal_at(c);
@@ -26,7 +29,8 @@ LUCH_FN SetupContext setup_context(const OpContext& c, bool bump_correction) {
     s.path_flags = c.points->flags[c.lane];
     s.caustics_reflective = !(c.scene->flags & SCENE_NO_REFLECTIVE_CAUSTICS);
     s.caustics_refractive = !(c.scene->flags & SCENE_NO_REFRACTIVE_CAUSTICS);
-    s.bump_correction = bump_correction;
+    s.bump_correction = (normals & BUMP_CORRECTION) != 0;
+    s.own_normal = (normals & OWN_NORMAL) != 0;
     return s;
 }
 // Emission and shadow rays have no use for lobes.
@@ -56,7 +60,7 @@ struct OpClosureHoldout {
     }
 };
 
-// A lobe. NUMBERS inputs after the weight; params[0]: bump correction; BODY has `read` (the inputs),
+// A lobe. NUMBERS inputs after the weight; params[0]: BUMP_CORRECTION, OWN_NORMAL; BODY has `read` (the inputs),
 // `weight`, `set` and `context`.
 #define LUCH_LOBE_OP(STRUCT, NUMBERS, PARAMS, BODY)                                                \
     struct STRUCT {                                                                                \
@@ -65,7 +69,7 @@ struct OpClosureHoldout {
             if (skips_lobes(c)) return;                                                            \
             InputReader read{in};                                                                  \
             Color weight = read.vec3();                                                            \
-            SetupContext context = setup_context(c, params[0] != 0);                               \
+            SetupContext context = setup_context(c, params[0]);                                    \
             ClosureSet& set = *c.closures;                                                         \
             BODY                                                                                   \
         }                                                                                          \
@@ -194,7 +198,7 @@ struct OpClosurePrincipled {
         if ((flags & PATH_TRANSPARENT_ONLY) && params[3] == 0) return;
         InputReader read{in};
         Color weight = read.vec3();
-        setup_principled(*c.closures, weight, parameters(read, params), setup_context(c, params[0] != 0));
+        setup_principled(*c.closures, weight, parameters(read, params), setup_context(c, params[0]));
     }
 };
 
@@ -235,7 +239,7 @@ struct OpClosurePrincipledSubsurface {
         p.subsurface_radius = radius;
         p.subsurface_ior = ior;
         p.subsurface_method = SubsurfaceMethod(params[4]);
-        SetupContext context = setup_context(c, params[0] != 0);
+        SetupContext context = setup_context(c, params[0]);
         context.subsurface_min_radius = smallest_walk_radius(c);
         setup_principled(*c.closures, weight, p, context);
     }
