@@ -197,9 +197,10 @@ class Compiler:
     # -- inside -------------------------------------------------------------------------------
 
     def _link(self, node: bpy.types.Node, identifier: str) -> bpy.types.NodeLink | None:
-        """What feeds an input. A node that is not known feeds nothing: the input's own value counts, as in Cycles."""
+        """What feeds an input. A value of a node that is not known feeds nothing: the input's own counts, as in Cycles.
+        What a closure or a medium is, those who read it ask."""
         link = self._links.get((node.name, identifier))
-        if link is None or link.from_node.bl_idname in EMITTERS or link.from_node.bl_idname in CLOSURE_EMITTERS:
+        if link is None or link.from_node.bl_idname in EMITTERS or link.from_socket.type == "SHADER":
             return link
         self.warn(link.from_node, "is not supported; the input that it feeds keeps its own value")
         return None
@@ -208,13 +209,8 @@ class Compiler:
         node, identifier = link.from_node, link.from_socket.identifier
         key = (node.name, self._offset, self._filter_width)
         if key not in self._outputs:
-            emit = EMITTERS.get(node.bl_idname)
-            if emit is None:
-                self.warn(node, "is not supported yet; its inactive value 0 is used")
-                self._outputs[key] = {}
-            else:
-                with self._entered(node):
-                    self._outputs[key] = emit(self, node)
+            with self._entered(node):
+                self._outputs[key] = EMITTERS[node.bl_idname](self, node)
         outputs = self._outputs[key]
         if identifier not in outputs:
             if outputs:
