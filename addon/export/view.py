@@ -148,10 +148,10 @@ def _border(
 
 
 def _pixels(edges: tuple[float, ...], width: int, height: int) -> tuple[int, int, int, int]:
-    """Whole pixels of a rectangle, at least one, inside a frame."""
-    x0 = min(max(round(edges[0]), 0), width - 1)
-    y0 = min(max(round(edges[1]), 0), height - 1)
-    return (x0, y0, min(max(round(edges[2]), x0 + 1), width), min(max(round(edges[3]), y0 + 1), height))
+    """Whole pixels of a rectangle, at least one, inside a frame: fractions are cut off, as by Cycles."""
+    x0 = min(max(int(edges[0]), 0), width - 1)
+    y0 = min(max(int(edges[1]), 0), height - 1)
+    return (x0, y0, min(max(int(edges[2]), x0 + 1), width), min(max(int(edges[3]), y0 + 1), height))
 
 
 def _panorama(

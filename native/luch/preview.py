@@ -18,11 +18,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from luch.render import Progress, Result, render
+from luch.render import Pace, Progress, Result, render
 from luch.scene import F32, Film, Scene
 
 # How often a render is asked whether its scene is still wanted: with a batch of paths beside, an edit waits so long.
-WATCH_SECONDS = 0.02
+# Whoever waits at a window would rather know the error soon than have the last tenth of the speed.
+PACE = Pace(watch_seconds=0.02, look_share=0.05)
 COARSEST = 4  # pixels of the finished picture along a side of one of the first
 MOST_COARSE = 32  # where pictures are given up before their first sample is there
 # A step that shows the finished picture's size within this time needs no coarser one before it.
@@ -31,6 +32,7 @@ MOST_BUILDING = 0.25  # of that time, for another picture between
 # Pictures are read at most so often, and reading takes at most this share of the time.
 PICTURE_SECONDS = 0.1
 PICTURE_SHARE = 0.1
+WORDS_SECONDS = 0.25  # between two texts
 
 
 @dataclass(frozen=True)
@@ -182,16 +184,18 @@ class Preview:
 
     def _refine(self, scene: Scene, tag: object, version: int) -> None:
         """Samples of the finished size, until a limit is reached."""
-        next_read = 0.0
+        next_read = next_words = 0.0
 
         def look(progress: Progress) -> None:
-            nonlocal next_read
+            nonlocal next_read, next_words
             now = time.perf_counter()
             if progress.new_picture and now >= next_read:
                 self._show(Picture(progress.passes()["Combined"], scene.film, version, tag))
                 took = time.perf_counter() - now
                 next_read = now + max(PICTURE_SECONDS, took / PICTURE_SHARE)
-            self._say(version, self._describe(progress))
+            if now >= next_words:
+                next_words = now + WORDS_SECONDS
+                self._say(version, self._describe(progress))
 
         result = self._render(scene, version, look)
         self._show(Picture(result.passes["Combined"], scene.film, version, tag))
@@ -208,7 +212,7 @@ class Preview:
                 look(progress)
             return True
 
-        result = render(scene, progress=goes_on, watch_seconds=WATCH_SECONDS)
+        result = render(scene, progress=goes_on, pace=PACE)
         if version != self._version:
             raise _Superseded
         return result

@@ -60,6 +60,14 @@ class Progress:
     preparing: bool = False  # structures and lights are being built; no sample was traced yet
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How often a render stops to look, at itself and at its caller."""
+
+    watch_seconds: float = WATCH_SECONDS  # between two questions to the caller
+    look_share: float = LOOK_SHARE
+
+
 @dataclass
 class Result:
     """The finished picture: pass name -> float32 (H, W, C), bottom row first; and what it took."""
@@ -68,6 +76,9 @@ class Result:
     stats: dict[str, Any] = field(default_factory=dict)
     cancelled: bool = False
     sums: Sums | None = None  # for luch.merge, if Settings.mergeable
+
+
+PACE = Pace()
 
 
 def preparing(total: int, start: float) -> Progress:
@@ -121,9 +132,9 @@ class _Loop:
     """One render while it grows: steps, looks, and what ends it."""
 
     def __init__(self, renderer: Any, scene: Scene, settings: Settings, progress: Callable[[Progress], bool] | None,
-                 start: float, watch_seconds: float = WATCH_SECONDS) -> None:  # fmt: skip
+                 start: float, pace: Pace) -> None:  # fmt: skip
         self.renderer, self.settings, self.progress, self.start = renderer, settings, progress, start
-        self.watch_seconds = watch_seconds
+        self.pace = pace
         self.curve = Curve()
         self.stopping = Stopping(max(1, settings.samples), settings.error_limit)
         self.done = 0
@@ -147,7 +158,9 @@ class _Loop:
         def goes_on() -> bool:
             return self.progress is None or self.progress(preparing(self.stopping.samples, self.start))
 
-        self.cancelled = not watched(self.renderer.prepare, self.renderer, goes_on, watch_seconds=self.watch_seconds)
+        self.cancelled = not watched(
+            self.renderer.prepare, self.renderer, goes_on, watch_seconds=self.pace.watch_seconds
+        )
         self.prepared = time.perf_counter()
 
     def seconds_left(self) -> float:
@@ -173,7 +186,7 @@ class _Loop:
             return not (self.cancelled or self.timed_out)
 
         left = self.seconds_left if first > 0 else lambda: float("inf")
-        watched(self._work(count), self.renderer, goes_on, left, self.watch_seconds)
+        watched(self._work(count), self.renderer, goes_on, left, self.pace.watch_seconds)
         if self.cancelled or self.timed_out:
             return
         self.done += count
@@ -200,7 +213,7 @@ class _Loop:
             points.pop()  # the film may hold more since: parts of a step that was cut off
         elif seen:
             return
-        allowed = LOOK_SHARE * self.seconds
+        allowed = self.pace.look_share * self.seconds
         if self.settings.error_limit > 0.0:
             allowed = max(allowed, QUICK_LOOK_SECONDS)
         # Where samples go must not depend on how fast the machine is.
@@ -261,12 +274,10 @@ class _Loop:
         return "error" if self.stopping.reached else "time" if self.timed_out else "samples"
 
 
-def render(
-    scene: Scene, *, progress: Callable[[Progress], bool] | None = None, watch_seconds: float = WATCH_SECONDS
-) -> Result:
+def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, pace: Pace = PACE) -> Result:
     """Renders ``scene`` as its settings say, until its samples, its time limit or the error asked for are reached.
 
-    progress is called every watch_seconds (luch.quality, denoise, verify: ten times a second) and at the end of every
+    progress is called as pace says (by luch.quality, denoise and verify as by default, ten times a second) and at the end of every
     step; returning False cancels, and the film so far is returned (``Result.cancelled``); what it raises ends the
     render at once and comes out of here. Raises ValueError for a scene that does not
     fit together, naming the object, MemoryError with the bytes it would take where there are fewer,
@@ -296,7 +307,7 @@ def render(
     with memory.explained(traced), faults_told():
         renderer, warnings = _renderer_for(traced)
         memory.require(traced, renderer.stats()["film_pixel_bytes"] + memory.READ_PIXEL_BYTES)
-        loop = _Loop(renderer, scene, settings, progress, start, watch_seconds)
+        loop = _Loop(renderer, scene, settings, progress, start, pace)
         loop.prepare()
         loop.run()
         passes = {name: np.asarray(image) for name, image in renderer.passes().items()}

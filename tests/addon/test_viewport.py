@@ -9,7 +9,6 @@ from __future__ import annotations
 import gc
 import os
 import threading
-import time
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,6 +22,18 @@ from luch import core
 from luch.scene import Film
 from mathutils import Matrix
 from numpy.typing import NDArray
+from support.viewports import (
+    HEIGHT,
+    WAIT_S,
+    WIDTH,
+    Window,
+    depsgraph,
+    edits,
+    orthographic,
+    perspective,
+    room_with_a_cube,
+    shown,
+)
 
 from addon import report, viewport
 from addon.export.context import ExportContext
@@ -31,64 +42,12 @@ from addon.viewport import Viewport
 
 F32 = NDArray[np.float32]
 MIB = 1024.0 * 1024.0
-WAIT_S = 60.0
-WIDTH, HEIGHT = 60, 40
-
-
-def perspective(right: float, top: float, x: float = 0.0, y: float = 0.0) -> Matrix:
-    """OpenGL's projection: half the width and height that are seen in a distance of 1, and the centre."""
-    return Matrix(((1 / right, 0, x / right, 0), (0, 1 / top, y / top, 0), (0, 0, -1.0002, -0.2), (0, 0, -1, 0)))
-
-
-def orthographic(right: float, top: float, x: float = 0.0, y: float = 0.0) -> Matrix:
-    return Matrix(((1 / right, 0, 0, -x / right), (0, 1 / top, 0, -y / top), (0, 0, -0.002, 0), (0, 0, 0, 1)))
-
-
-class Window:
-    """What Blender hands to view_update and view_draw."""
-
-    def __init__(self, width: int = WIDTH, height: int = HEIGHT) -> None:
-        places = [area.spaces.active for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"]
-        self.space_data: Any = places[0]
-        eye = Matrix.Translation((0.3, -0.2, 5.0))
-        view = SimpleNamespace(
-            view_matrix=eye.inverted(), window_matrix=perspective(0.4, 0.4 * height / width), is_perspective=True,
-            view_perspective="PERSP", view_location=(0.0, 0.0, 0.0),
-        )  # fmt: skip
-        self.region = SimpleNamespace(width=width, height=height, data=view)
-
-    def look_from(self, x: float, y: float, z: float) -> None:
-        self.region.data.view_matrix = Matrix.Translation((x, y, z)).inverted()
-
-    def through_camera(self) -> None:
-        scene = bpy.context.scene
-        assert scene.camera is not None
-        self.region.data.view_perspective = "CAMERA"
-        self.region.data.view_matrix = scene.camera.matrix_world.inverted()
-
-
-def depsgraph() -> Any:
-    return bpy.context.evaluated_depsgraph_get()
-
-
-def shown(view: Viewport, window: Window) -> F32:
-    """The finished picture of the file as it is."""
-    view.update(window, depsgraph())
-    assert view.preview.wait(WAIT_S) and view.preview.picture is not None, view.text
-    return view.preview.picture.pixels
 
 
 @pytest.fixture
 def room(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
     """A cube with a material under a sun, a camera, four samples. No renderer outlives the test."""
-    bpy.ops.mesh.primitive_cube_add()
-    bpy.context.object.data.materials.append(bpy.data.materials.new("Stone"))
-    bpy.ops.object.light_add(type="SUN")
-    bpy.ops.object.camera_add(location=(0.0, 0.0, 6.0))
-    scene.camera = bpy.context.object
-    scene.render.engine = "LUCH"
-    scene.luch.preview_samples = 4
-    bpy.context.view_layer.update()
+    room_with_a_cube(scene)
     yield scene
     viewport.stop_all()
 
@@ -261,44 +220,6 @@ def test_what_cannot_be_shown_is_told_once_and_tried_again_at_the_next_change(
     window.region.data.view_matrix = place
     assert np.array_equal(shown(view, window), good)
     assert view.text.startswith("Sample")
-
-
-def edit(rng: np.random.Generator, window: Window) -> bool:
-    """One of a user's edits; whether the view alone moved."""
-    kind, cube = int(rng.integers(8)), bpy.data.objects["Cube"]
-    mesh: Any = cube.data
-    if kind <= 1:
-        mesh.vertices[int(rng.integers(len(mesh.vertices)))].co.x += float(rng.normal(0.0, 0.1))
-        mesh.update()
-    elif kind == 2:
-        cube.location.z = float(rng.normal(0.0, 0.3))
-    elif kind == 3:
-        tree = mesh.materials[0].node_tree
-        tree.nodes["Principled BSDF"].inputs["Base Color"].default_value[0] = float(rng.random())
-    elif kind == 4:
-        cube.data = mesh.copy()
-        bpy.data.meshes.remove(mesh)
-    elif kind == 5:
-        cube.modifiers.clear()
-        cube.modifiers.new("Bevel", "BEVEL").width = float(rng.random() * 0.3)
-    elif kind == 6:
-        mesh.materials[0] = bpy.data.materials.new("Other")
-    else:
-        window.look_from(float(rng.normal(0.0, 0.3)), 0.0, 5.0)
-        return True
-    return False
-
-
-def edits(count: int, seconds: float, window: Window, view: Viewport) -> None:
-    """So many edits in about that time."""
-    rng, began = np.random.default_rng(3), time.perf_counter()
-    for number in range(count):
-        moved = edit(rng, window)
-        graph = depsgraph()
-        if not moved:
-            view.update(window, graph)
-        view.follow(window, graph)
-        time.sleep(max(0.0, began + seconds * (number + 1) / count - time.perf_counter()))
 
 
 @pytest.mark.promise(17)
