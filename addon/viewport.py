@@ -37,11 +37,12 @@ class Viewport:
 
         from .export.cache import MeshCache
 
-        self.preview = Preview(report.viewport_line, report.viewport_end_line, report.describe_error)
+        self.preview = Preview(report.viewport_line, report.viewport_end_line, _explain)
         self._cache: MeshCache = MeshCache()
         self._scene: Scene | None = None  # as it was submitted last
         self._view: View | None = None
         self._error = ""
+        self._failed_at: tuple[object, ...] = ()  # the view
         self._pixel_size = 1
         self._told: set[str] = set()
         self._on_screen = PictureOnScreen()
@@ -59,27 +60,33 @@ class Viewport:
             scene, view = export_view_scene(depsgraph, context.region, context.space_data, self._cache)
             self._submit(scene, view)
         except BaseException as error:  # of drivers and node scripts too: none may end Blender
-            self._fail(error)
+            self._fail(error, context)
 
     def follow(self, context: Any, depsgraph: Any) -> None:
-        """The view may have turned, or the region grown: nothing but the camera is read."""
+        """The view may have turned, or the region grown: nothing but the camera is read, unless there is no scene yet."""
         from .export import seen_anew
+        from .export.view import view_state
 
         if self._scene is None:
+            if self._error and view_state(context.region) != self._failed_at:
+                self.update(context, depsgraph, self._pixel_size)
             return
         try:
             scene, view = seen_anew(self._scene, depsgraph, context.region, context.space_data)
             self._submit(scene, view)
         except BaseException as error:
-            self._fail(error)
+            self._fail(error, context)
 
     def draw(self, context: Any, depsgraph: Any, engine: Any) -> None:
         """The latest picture, into the region that Blender draws."""
         self.follow(context, depsgraph)
         self.news_seen = self.preview.news
         picture = self.preview.picture
-        if picture is not None:
-            self._on_screen.draw(picture, engine, depsgraph.scene)
+        try:
+            if picture is not None:
+                self._on_screen.draw(picture, engine, depsgraph.scene)
+        except Exception as error:  # no picture, no second try with it
+            self._fail(error, context)
         engine.update_stats("", self.text)
 
     @property
@@ -101,8 +108,11 @@ class Viewport:
                 print(f"Luch: {warning}", file=sys.stderr)
         self.preview.submit(scene, view)
 
-    def _fail(self, error: BaseException) -> None:
+    def _fail(self, error: BaseException, context: Any) -> None:
         """Say it once; the next change is another try."""
+        from .export.view import view_state
+
+        self._failed_at = view_state(context.region)
         text = report.describe_error(error)
         if text != self._error:
             traceback.print_exception(error)
@@ -112,6 +122,12 @@ class Viewport:
 
     def stop(self, wait: bool = False) -> None:
         self.preview.stop(wait)
+
+
+def _explain(error: BaseException) -> str:
+    """For the view's status; the rest goes to the console. On the renderer's thread."""
+    traceback.print_exception(error)
+    return report.describe_error(error)
 
 
 def watch(engine: Any) -> None:

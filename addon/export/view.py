@@ -38,21 +38,29 @@ def read_view(region: Any, space: Any, context: ExportContext) -> View:
     width, height = region.width, region.height
     if width < 1 or height < 1:
         raise ValueError("The viewport has no pixels.")
-    view = space.region_3d if getattr(region, "data", None) is None else region.data
+    view = region.data
     through = _camera_object(view, space, context)
     if through is None:
         camera, origin = _free_camera(view, space)
     else:
         camera = export_camera(through, context, None)
-        origin = _place(camera.matrix)
+        origin = _place(camera.matrix, "The camera's transform is not finite: clear it with Object > Clear.")
+    panorama = camera.kind not in ("PERSP", "ORTHO")
     frame = (0.0, 0.0, float(width), float(height))
-    if through is not None and (context.scene.render.use_border or camera.kind == "EQUIRECTANGULAR"):
+    if through is not None and (context.scene.render.use_border or panorama):
         frame = _camera_frame(through, view, context, width, height)
-    if camera.kind == "EQUIRECTANGULAR":
+    if panorama:
         return _panorama(camera, frame, _camera_border(context), (width, height), origin)
     aspect = _fit(camera, np.array(view.window_matrix, dtype=np.float64), width, height)
     border = _border(through, space, context, frame, width, height)
     return View(camera, width, height, aspect, border, (0.0, 0.0), (float(width), float(height)), origin)
+
+
+def view_state(region: Any) -> tuple[object, ...]:
+    """What changes when the view does."""
+    view = region.data
+    matrices = (bytes(np.array(matrix, np.float32)) for matrix in (view.view_matrix, view.window_matrix))
+    return (region.width, region.height, view.view_perspective, *matrices)
 
 
 def _camera_object(view: Any, space: Any, context: ExportContext) -> Any:
@@ -65,9 +73,9 @@ def _camera_object(view: Any, space: Any, context: ExportContext) -> Any:
     return chosen if chosen.is_evaluated else chosen.evaluated_get(context.depsgraph)
 
 
-def _place(matrix: F64) -> tuple[float, float, float]:
+def _place(matrix: F64, otherwise: str) -> tuple[float, float, float]:
     if not np.isfinite(matrix).all():
-        raise ValueError("The view's transform is not finite: reset it with View > Frame All.")
+        raise ValueError(otherwise)
     return (float(matrix[0, 3]), float(matrix[1, 3]), float(matrix[2, 3]))
 
 
@@ -75,7 +83,7 @@ def _free_camera(view: Any, space: Any) -> tuple[Camera, tuple[float, float, flo
     """Of a view that looks through no camera. Orthographic views see as far behind their place as before it."""
     matrix = np.linalg.inv(np.array(view.view_matrix, dtype=np.float64))[:3]
     matrix[:, :3] /= np.linalg.norm(matrix[:, :3], axis=0)
-    origin = _place(matrix)
+    origin = _place(matrix, "The view's transform is not finite: reset it with View > Frame All.")
     camera = Camera(matrix=matrix, lens_mm=space.lens, clip_start=space.clip_start, clip_end=space.clip_end)
     if not view.is_perspective:
         camera.kind = "ORTHO"
