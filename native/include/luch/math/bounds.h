@@ -109,7 +109,7 @@ inline constexpr float HEMISPHERE_SOLID_ANGLE = 6.0f;
 
 // -- motion ----------------------------------------------------------------------------------------
 
-// From this cosine on, an arc is as good as its chord: they differ by 2e-6 of the angle.
+// From this cosine on, an arc is as good as its chord: they differ by 5e-7 rad.
 inline constexpr float SHORT_ARC_COSINE = 0.9995f;
 
 LUCH_FN constexpr float gamma_f(int n) { return float(n) * EPS / (1.0f - float(n) * EPS); }
