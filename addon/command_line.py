@@ -11,6 +11,7 @@ import functools
 import sys
 from typing import Any, NoReturn
 
+from luch.samplers import NAMES as SAMPLERS
 from luch.stopping import CUSTOM, STEPS, UNLIMITED_SAMPLES
 
 
@@ -34,6 +35,7 @@ OPTIONS = (
     "--luch-adaptive",
     "--luch-gpus N",
     "--luch-seed N",
+    "--luch-sampler SOBOL|INDEPENDENT|LATTICE",
     "--luch-mergeable",
     "--luch-first-sample N",
     "--luch-samples-in-all N",
@@ -62,6 +64,7 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     parser.add_argument("--luch-mergeable", action="store_const", const=True)
     for name in ("seed", "first-sample", "samples-in-all"):
         parser.add_argument(f"--luch-{name}", type=_count)
+    parser.add_argument("--luch-sampler", choices=SAMPLERS, type=str.upper)
     parser.add_argument("--luch-adaptive", action="store_const", const=True)
     found, rest = parser.parse_known_args(own)
     unknown = [word for word in rest if word.startswith("--luch")]

@@ -164,6 +164,16 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
     use_animated_seed: BoolProperty(
         name="Use Animated Seed", default=False, description="Another noise in every frame of an animation"
     )
+    sampling_pattern: EnumProperty(
+        name="Sampling Pattern",
+        items=[
+            ("SOBOL", "Sobol-Burley", "Owen-scrambled Sobol points: evenly spread in every two dimensions"),
+            ("INDEPENDENT", "Independent", "Numbers that know nothing of each other: more noise, the plain yardstick"),
+            ("LATTICE", "Lattice", "Points of regular lattices, shifted at random in every dimension"),
+        ],
+        default="SOBOL",
+        description="How random numbers are spread: more or less noise, the same picture in the end",
+    )
     max_bounces: _bounces("Max Bounces", 12, "Bounces of any kind on a path")
     diffuse_bounces: _bounces("Diffuse Bounces", 4, "Bounces off diffuse surfaces on a path")
     glossy_bounces: _bounces("Glossy Bounces", 4, "Bounces off glossy surfaces on a path")

@@ -36,7 +36,7 @@ def draw_settings(layout: Any, scene: Any, *names: str) -> None:
 
 
 class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
-    """Samples, time, seed."""
+    """Samples, time, error."""
 
     bl_label = "Sampling"
 
@@ -53,8 +53,6 @@ class LUCH_RENDER_PT_sampling(LuchPanel, bpy.types.Panel):
             "time_limit",
             *(("error_limit_percent", "use_adaptive_sampling", "use_denoising") if custom else ()),
             "verify",
-            "seed",
-            "use_animated_seed",
             "estimate_error",
         )
         row = self.layout.row(align=True)
@@ -72,6 +70,17 @@ class LUCH_RENDER_PT_viewport(LuchPanel, bpy.types.Panel):
         names = ("preview_samples", "preview_time_limit", "preview_error_limit_percent")
         draw_settings(self.layout, context.scene, *names)
         self.layout.prop(context.scene.render, "preview_pixel_size")
+
+
+class LUCH_RENDER_PT_sampling_advanced(LuchPanel, bpy.types.Panel):
+    """Which random numbers paths draw."""
+
+    bl_label = "Advanced"
+    bl_parent_id = "LUCH_RENDER_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        draw_settings(self.layout, context.scene, "seed", "use_animated_seed", "sampling_pattern")
 
 
 class LUCH_RENDER_PT_lights(LuchPanel, bpy.types.Panel):
@@ -204,6 +213,7 @@ class LUCH_VIEWLAYER_PT_passes_light(LuchPanel, bpy.types.Panel):
 CLASSES = (
     LUCH_RENDER_PT_sampling,
     LUCH_RENDER_PT_viewport,
+    LUCH_RENDER_PT_sampling_advanced,
     LUCH_RENDER_PT_lights,
     LUCH_RENDER_PT_light_paths,
     LUCH_RENDER_PT_bias,

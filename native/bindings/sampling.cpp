@@ -24,6 +24,22 @@ Floats draw_all(u32 seed, const Indices& indices, Draw draw) {
     return out;
 }
 
+// family: SamplerFamily, whatever the dimension's highest bits say.
+template <int CHANNELS, typename Draw>
+void bind_draw(py::module_& m, const char* name, Draw draw) {
+    m.def(
+        name,
+        [=](u32 seed, const Indices& index, u32 dimension, u32 family) {
+            Floats out;
+            with_family(SamplerFamily(family), [&](auto tag) {
+                out =
+                    draw_all<CHANNELS>(seed, index, [=](const Sampler& s, float* to) { draw(tag, s, dimension, to); });
+            });
+            return out;
+        },
+        py::arg("seed"), py::arg("index"), py::arg("dimension"), py::arg("family") = 0u);
+}
+
 // Applies a warp of the unit square row by row: u (N, 2) -> (N, channels).
 template <int CHANNELS, typename Warp>
 Floats warp_all(const Floats& u, Warp warp) {
@@ -60,28 +76,36 @@ void bind_warps(py::module_& m) {
 }  // namespace
 
 void bind_sampling(py::module_& m) {
-    auto sampling = m.def_submodule("sampling", "Owen-scrambled Sobol points and warps of the unit square.");
-    sampling.def("sample_1d", [](u32 seed, const Indices& index, u32 dimension) {
-        return draw_all<1>(seed, index, [=](const Sampler& s, float* to) { *to = sample_1d(s, dimension); });
+    auto sampling = m.def_submodule("sampling", "Families of points and warps of the unit square.");
+    bind_draw<1>(sampling, "sample_1d", [](auto family, const Sampler& s, u32 dimension, float* to) {
+        *to = sample_1d_of<family.VALUE>(s, dimension);
     });
-    sampling.def("sample_2d", [](u32 seed, const Indices& index, u32 dimension) {
-        return draw_all<2>(seed, index, [=](const Sampler& s, float* to) {
-            Vec2 v = sample_2d(s, dimension);
-            to[0] = v.x, to[1] = v.y;
-        });
+    bind_draw<2>(sampling, "sample_2d", [](auto family, const Sampler& s, u32 dimension, float* to) {
+        Vec2 v = sample_2d_of<family.VALUE>(s, dimension);
+        to[0] = v.x, to[1] = v.y;
     });
-    sampling.def("sample_3d", [](u32 seed, const Indices& index, u32 dimension) {
-        return draw_all<3>(seed, index, [=](const Sampler& s, float* to) {
-            Vec3 v = sample_3d(s, dimension);
-            to[0] = v.x, to[1] = v.y, to[2] = v.z;
-        });
+    bind_draw<3>(sampling, "sample_3d", [](auto family, const Sampler& s, u32 dimension, float* to) {
+        Vec3 v = sample_3d_of<family.VALUE>(s, dimension);
+        to[0] = v.x, to[1] = v.y, to[2] = v.z;
     });
     sampling.def(
+        "sample_any",
+        [](u32 seed, const Indices& index, u32 dimension) {
+            return draw_all<3>(seed, index, [=](const Sampler& s, float* to) {
+                Vec3 v = sample_3d(s, dimension);
+                Vec2 two = sample_2d(s, dimension);
+                bool same = two.x == v.x && two.y == v.y && sample_1d(s, dimension) == v.x;
+                to[0] = same ? v.x : -1.0f, to[1] = v.y, to[2] = v.z;
+            });
+        },
+        "As paths draw: the dimension's two highest bits say the family. x is -1 where fewer coordinates differ.");
+    sampling.def(
         "pixel_sampler",
-        [](u32 x, u32 y, u32 seed, u32 log2_samples) {
-            PixelSampler p = make_pixel_sampler(x, y, seed, log2_samples);
+        [](u32 x, u32 y, u32 seed, u32 log2_samples, u32 family) {
+            PixelSampler p = make_pixel_sampler(x, y, seed, log2_samples, SamplerFamily(family));
             return py::make_tuple(p.seed, p.first_index);
         },
+        py::arg("x"), py::arg("y"), py::arg("seed"), py::arg("log2_samples"), py::arg("family") = 0u,
         "(seed, first index) of a pixel's samples.");
     bind_warps(sampling);
 }

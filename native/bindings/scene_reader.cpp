@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 
 #include "bindings/camera.h"
@@ -14,6 +15,19 @@
 
 namespace luch::bindings {
 namespace {
+
+// In the order of luch/samplers.py.
+constexpr const char* SAMPLER_NAMES[] = {"SOBOL", "INDEPENDENT", "LATTICE"};
+static_assert(std::size(SAMPLER_NAMES) == size_t(SamplerFamily::COUNT));
+
+SamplerFamily named_sampler(const std::string& name) {
+    const auto* found = std::find(std::begin(SAMPLER_NAMES), std::end(SAMPLER_NAMES), name);
+    if (found == std::end(SAMPLER_NAMES)) {
+        throw std::invalid_argument("Settings: the sampler is '" + name +
+                                    "'; it can be SOBOL, INDEPENDENT or LATTICE.");
+    }
+    return SamplerFamily(found - std::begin(SAMPLER_NAMES));
+}
 
 template <class T>
 using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
@@ -546,6 +560,7 @@ struct Reader {
         input.light_tree = py::cast<bool>(settings.attr("light_tree"));
         read_curve_settings(settings);
         input.seed = count("seed");
+        input.sampler = named_sampler(py::cast<std::string>(settings.attr("sampler")));
         input.samples = count("samples");
         input.first_sample = count("first_sample");
         input.samples_in_all = count("samples_in_all");

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from luch import samplers
 from luch.accuracy import Estimate, overstated, percent
 
-PRIOR_RATE, PRIOR_SPREAD = 1.07, 0.12  # measured from 32 samples on, over six scenes: 1.0 to 1.15
 LOWEST_RATE, HIGHEST_RATE = 0.9, 1.8
 POINT_SPREAD = 0.05  # of the logarithm of a relMSE, beside its interval
 MEMORY = 0.5  # weight of a point over that of another with twice as many samples: the rate drifts towards 1
@@ -37,7 +37,9 @@ class Forecast:
 class Curve:
     """Points must come with growing samples and seconds."""
 
-    def __init__(self) -> None:
+    def __init__(self, sampler: str = samplers.DEFAULT) -> None:
+        """sampler: of luch.samplers, whose points the render draws; what is known of its rate before it has begun."""
+        self.family = samplers.FAMILIES[sampler]
         self.points: list[tuple[int, float, Estimate, float]] = []  # samples, seconds, as told, share of its first part
 
     def add(self, samples: int, seconds: float, told: Estimate, share: float = 0.5) -> None:
@@ -47,10 +49,11 @@ class Curve:
     def rate(self) -> tuple[float, float]:
         """p of relMSE ~ samples^-p with its standard deviation: a line through the points, and what is known before."""
         told = [point for point in self.points if point[2].error > 0.0]
-        if len(told) < 2:
-            return PRIOR_RATE, PRIOR_SPREAD
+        known, doubted = self.family.rate, self.family.spread
+        if len(told) < 2 or doubted == 0.0:
+            return known, doubted
         x = np.log([point[0] for point in told])
-        y = np.log([point[2].error ** 2 / overstated(point[3], PRIOR_RATE) for point in told])
+        y = np.log([point[2].error ** 2 / overstated(point[3], known) for point in told])
         spread = np.array([2.0 * point[2].spread for point in told])
         w = MEMORY ** ((x[-1] - x) / np.log(2.0)) / (spread**2 + POINT_SPREAD**2)
         x, y = x - np.average(x, weights=w), y - np.average(y, weights=w)
@@ -58,8 +61,8 @@ class Curve:
         # Points that lie off any line more than they claim to are less sure than they claim.
         rest = float(np.sum(w * (y - slope / weight * x) ** 2)) / max(1, len(told) - 2)
         doubt = max(1.0, rest)
-        before = PRIOR_SPREAD**-2
-        p = (before * PRIOR_RATE - slope / doubt) / (before + weight / doubt)
+        before = doubted**-2
+        p = (before * known - slope / doubt) / (before + weight / doubt)
         return float(np.clip(p, LOWEST_RATE, HIGHEST_RATE)), float((before + weight / doubt) ** -0.5)
 
     def estimates(self) -> list[Estimate]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from luch import accuracy, curve
+from luch import accuracy, curve, samplers
 from luch._native import core
 from luch.scene import F32, F64, Film
 
@@ -46,6 +46,12 @@ class Sums:
     rate: tuple[float, float]  # as luch.curve.Curve.rate has it
     independent: bool = False  # of several seeds: parts owe each other nothing
     name: str = "render"  # for messages
+    sampler: str = samplers.DEFAULT  # whose sequence; "": of several
+
+    @property
+    def sequence(self) -> tuple[str, int]:
+        """Samples of one sequence know of each other; no two of one may be the same."""
+        return self.sampler, self.seed
 
     def native(self) -> Any:
         """A film of the core that holds these sums."""
@@ -85,7 +91,7 @@ class Sums:
         told = {
             "film": asdict(self.film), "origin": self.origin, "seed": self.seed, "first_sample": self.first_sample,
             "samples": self.samples, "rate": self.rate, "independent": self.independent,
-            "channels": self.rows.shape[1],
+            "channels": self.rows.shape[1], "sampler": self.sampler,
         }  # fmt: skip
         return {FIELD: json.dumps(told)}
 
@@ -107,6 +113,7 @@ def read_sums(path: str | os.PathLike[str]) -> tuple[Sums, dict[str, Any]]:
     return Sums(
         film, tuple(told["origin"]), rows, (counts[:, 0] * HALF_WORD + counts[:, 1]).astype(np.uint32), told["seed"],
         told["first_sample"], told["samples"], tuple(told["rate"]), told["independent"], name,
+        told.get("sampler", samplers.DEFAULT),
     ), header  # fmt: skip
 
 
@@ -121,7 +128,7 @@ def _film(told: Mapping[str, Any]) -> Film:
 
 def merge(parts: Sequence[Sums]) -> Sums:
     """One render of all the samples. Raises MergeError."""
-    parts = sorted(parts, key=lambda part: (part.seed, part.first_sample))
+    parts = sorted(parts, key=lambda part: (part.sequence, part.first_sample))
     first = parts[0]
     for one, following in itertools.pairwise(parts):
         _check(one, following)
@@ -129,7 +136,7 @@ def merge(parts: Sequence[Sums]) -> Sums:
     for part in parts[1:]:
         whole.merge(part.native())
     rows, counts = (array.copy() for array in whole.arrays())
-    one_seed = all(part.seed == first.seed and not part.independent for part in parts)
+    one_seed = all(part.sequence == first.sequence and not part.independent for part in parts)
     ends = [part.first_sample + part.samples for part in parts]
     joined = one_seed and all(end == part.first_sample for end, part in zip(ends, parts[1:], strict=False))
     samples = sum(part.samples for part in parts)
@@ -145,7 +152,17 @@ def merge(parts: Sequence[Sums]) -> Sums:
         _part_between(rows, parts, marks, samples)
     rate = max(parts, key=lambda part: part.samples).rate
     return Sums(
-        first.film, first.origin, rows, counts, first.seed, first.first_sample, samples, rate, not one_seed, "merged"
+        first.film,
+        first.origin,
+        rows,
+        counts,
+        first.seed,
+        first.first_sample,
+        samples,
+        rate,
+        not one_seed,
+        "merged",
+        first.sampler if len({part.sampler for part in parts}) == 1 else "",
     )
 
 
@@ -154,7 +171,7 @@ def _check(one: Sums, following: Sums) -> None:
     if asdict(one.film) != asdict(following.film) or one.origin != following.origin:
         raise MergeError(f"{where}: their films differ. Render one scene with the same size and passes.")
     end = one.first_sample + one.samples
-    if one.seed == following.seed and following.first_sample < end:
+    if one.sequence == following.sequence and following.first_sample < end:
         raise MergeError(
             f"{where}: both hold sample {following.first_sample} of seed {one.seed}, which would count twice. "
             f"Render one with --first-sample {end}, or with another --seed."

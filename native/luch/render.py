@@ -135,7 +135,7 @@ class _Loop:
                  start: float, pace: Pace) -> None:  # fmt: skip
         self.renderer, self.settings, self.progress, self.start = renderer, settings, progress, start
         self.pace = pace
-        self.curve = Curve()
+        self.curve = Curve(settings.sampler)
         self.stopping = Stopping(max(1, settings.samples), settings.error_limit)
         self.done = 0
         self.adaptive = _adaptive_for(scene.film, settings)
@@ -321,6 +321,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
         prepare_seconds=loop.prepared - start,
         render_seconds=loop.render_seconds,
         seed=settings.seed,
+        sampler=settings.sampler,
         device=getattr(renderer, "device", "CPU"),
         instruction_set=core.__name__.rsplit("_", 1)[-1],
         peak_memory_bytes=peak_memory_bytes(),
@@ -348,5 +349,5 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
     if settings.mergeable:
         rows, counts = renderer.film_arrays()
         sums = Sums(traced.film, scene.origin, np.array(rows), np.array(counts), settings.seed, settings.first_sample,
-                    loop.done, loop.curve.rate())  # fmt: skip
+                    loop.done, loop.curve.rate(), sampler=settings.sampler)  # fmt: skip
     return Result(passes, stats, loop.cancelled, sums)

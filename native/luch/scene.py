@@ -307,6 +307,7 @@ class Settings:
     error_limit: float = 0.0  # the render ends when its error is that small (luch.accuracy), 0: none
     adaptive: bool = False  # until that error: more samples where the error is (luch.adaptive)
     seed: int = 0
+    sampler: str = "SOBOL"  # a name of luch.samplers
     # Several renders of one seed, each with samples of its own, merge into one (luch.merge).
     first_sample: int = 0
     samples_in_all: int = 0  # of all those renders; 0: no others follow

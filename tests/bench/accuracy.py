@@ -35,7 +35,7 @@ sys.path[:0] = [str(ROOT / "tests" / "bench"), str(ROOT), str(ROOT / "native"), 
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 from accuracy_page import FILE, Kept, Row, report, table  # noqa: E402
-from luch import accuracy, image, pixel_error  # noqa: E402
+from luch import accuracy, image, pixel_error, samplers  # noqa: E402
 from luch._native import core  # noqa: E402
 from luch.cuda.several import renderer_for  # noqa: E402
 from luch.curve import Curve, correction  # noqa: E402
@@ -51,7 +51,6 @@ from buildtools.inside import session  # noqa: E402
 
 OUT = ROOT / "out" / "bench"
 MOST = 256  # samples of A2 and A6
-SAMPLERS = ("SOBOL",)
 PIXELS_AT = 64  # samples of A3
 REFERENCE_SEEDS = 991, 992
 OPTIONS = "size", "seeds", "pairs", "reference", "device"  # that rows of one table have in common
@@ -98,7 +97,8 @@ def converged(scene: Scene, name: str, samples: int) -> Truth:
     file = OUT / "accuracy" / f"{name}-{film.width}x{film.height}-{samples}-halves.npy"
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
-        halves = [shot(scene, samples=samples // 2, seed=seed).passes["Combined"] for seed in REFERENCE_SEEDS]
+        plain = with_settings(scene, samples=samples // 2, sampler=samplers.DEFAULT)
+        halves = [shot(plain, seed=seed).passes["Combined"] for seed in REFERENCE_SEEDS]
         np.save(file, np.stack(halves)[..., :3].astype(np.float64))
     one, other = np.load(file)
     picture = (one + other) / 2.0
@@ -140,7 +140,7 @@ def look_at(scene: Scene, truth: Truth, seed: int, row: Row, pixels: Pixels) -> 
     settled = with_settings(scene, samples=MOST, seed=seed, estimate_error=True)
     renderer = renderer_for(settled) if scene.settings.device == "CUDA" else core.render.Renderer(settled)
     renderer.prepare()
-    curve, done, spent, seen = Curve(), 0, 0.0, []
+    curve, done, spent, seen = Curve(scene.settings.sampler), 0, 0.0, []
     forecasts: dict[int, tuple[Curve, float]] = {}
     while done < MOST:
         following = min(looks_after(done), MOST)
@@ -160,7 +160,7 @@ def look_at(scene: Scene, truth: Truth, seed: int, row: Row, pixels: Pixels) -> 
             row.a2.append((told.error / error) ** 2)
             row.a2_covered.append(told.error_low <= error <= told.error_high)
         if done == MOST // 4:
-            kept = Curve()
+            kept = Curve(scene.settings.sampler)
             kept.points = list(curve.points)
             forecasts[done * 4] = (kept, spent)
         if done in forecasts:
@@ -273,6 +273,7 @@ def main() -> int:
     parser.add_argument("--pairs", type=int, default=5, help="pairs of renders that A8 compares")
     parser.add_argument("--reference", type=int, default=8192, help="samples of the converged picture")
     parser.add_argument("--cycles", action="store_true", help="Cycles' noise threshold beside, on the same scenes")
+    parser.add_argument("--sampler", nargs="+", type=str.upper, default=[samplers.DEFAULT], choices=samplers.NAMES)
     parser.add_argument("--device", type=str.upper, default="CPU", choices=("CPU", "CUDA"), help="what renders")
     parser.add_argument("--append", action="store_true", help="keep what out/bench/accuracy.json has of this code")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no row after so long")
@@ -294,7 +295,7 @@ def measure(folder: Path, options: argparse.Namespace, kept: Kept) -> list[str]:
     """The rows that are missing; the names of those that could not be measured."""
     failed, ends = [], time.monotonic() + options.seconds
     for name in options.scene:
-        for sampler in SAMPLERS:
+        for sampler in options.sampler:
             if kept.has(name, sampler):
                 continue
             if time.monotonic() > ends:
@@ -316,7 +317,7 @@ def measure(folder: Path, options: argparse.Namespace, kept: Kept) -> list[str]:
 def row_of(file: Path, sampler: str, options: argparse.Namespace, first: bool) -> Row:
     """first: of this scene; Cycles has one sampler."""
     scene = opened(file, options.size)
-    scene.settings.device = options.device
+    scene.settings.device, scene.settings.sampler = options.device, sampler
     row = race(scene, file.stem, sampler, options)
     if options.cycles and first:
         row.cycles = cycles_thresholds(file, scene, row, options)

@@ -159,7 +159,17 @@ def names(scene: Scene) -> set[str]:
 def test_only_what_can_matter_in_the_scene_is_tried() -> None:
     scene = room()
     tried = names(scene)
-    assert {EXACT, AS_SET, "4 bounces", "clamp indirect 10", "fast precision", "kd-tree", "no light tree"} <= tried
+    assert {
+        EXACT,
+        AS_SET,
+        "independent sampler",
+        "lattice sampler",
+        "4 bounces",
+        "clamp indirect 10",
+        "fast precision",
+        "kd-tree",
+        "no light tree",
+    } <= tried
     assert {"without area lamps", "without coat", "without indirect light"} <= tried
     assert not tried & {"without depth of field", "without sun lamps", "without transparency", "BVH", "brute force"}
     lens = replace(scene, camera=replace(scene.camera, use_dof=True))
@@ -171,7 +181,7 @@ def test_what_is_not_tried_is_told_with_its_reason() -> None:
     found = plan(scene, effects_of(scene), "BVH", 100_000)
     assert not any(variant.group in ("Bounces", "Russian roulette") for variant in found.variants)
     assert any(line.startswith("Bounces") for line in found.absent)
-    assert any(line.startswith("Samplers") for line in found.absent)
+    assert any(line.startswith("Integrators") for line in found.absent)
 
 
 # -- the whole --------------------------------------------------------------------------------

@@ -257,3 +257,15 @@ def test_kernels_of_any_two_effects_draw_what_general_ones_do(place: str, effect
     full = render(replace(scene, settings=replace(scene.settings, device="CUDA", force_effects=["ALL"])))
     for name, image in lean.passes.items():
         assert np.array_equal(image.view(np.uint32), full.passes[name].view(np.uint32)), name
+
+
+@pytest.mark.parametrize("sampler", ["LATTICE", pytest.param("INDEPENDENT", marks=pytest.mark.cuda)])
+def test_kernels_draw_the_numbers_of_the_family_that_was_asked_for(place: str, sampler: str) -> None:
+    if place == FIBERS and sampler == "INDEPENDENT":
+        pytest.skip("on a GPU alone")
+    scene = replace(plain(), settings=replace(plain().settings, sampler=sampler))
+    cpu, _, ours, stats = both(scene)
+    check_equal("Combined", cpu["Combined"], ours["Combined"], place)
+    assert stats["kernel_plan"]["SAMPLER"] > 0
+    other = render(replace(scene, settings=replace(scene.settings, sampler="SOBOL")))
+    assert not np.array_equal(cpu["Combined"], other.passes["Combined"])

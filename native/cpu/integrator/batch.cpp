@@ -133,7 +133,7 @@ void Batch::generate(const PixelBlock& block) {
             keep_pixel(row);
             if (is_mark(block.first_sample)) film_mark(writer_, row, block.first_sample);
             film_count_samples(writer_, row, block.sample_count);
-            PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples);
+            PixelSampler pixel = make_pixel_sampler(px, py, scene_.seed, scene_.log2_samples, scene_.sampler);
             for (u32 s = 0; s < block.sample_count; s += CAMERA_LANES) {
                 u32 count = std::min(u32(CAMERA_LANES), block.sample_count - s);
                 generate_pixel(pixel, px, py, block.first_sample + s, count);
@@ -148,14 +148,18 @@ void Batch::generate(const PixelBlock& block) {
 void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
     // Random numbers first, of all samples: that loop vectorises.
     float filter_u[2][CAMERA_LANES], lens_u[2][CAMERA_LANES] = {};
-    for (u32 i = 0; i < count; i++) {
-        Vec2 u = sample_2d(make_sampler(pixel, first_sample + i), 0);
-        filter_u[0][i] = u.x, filter_u[1][i] = u.y;
-    }
-    for (u32 i = 0; i < count && scene_.has_lens; i++) {
-        Vec2 u = sample_2d(make_sampler(pixel, first_sample + i), 1);
-        lens_u[0][i] = u.x, lens_u[1][i] = u.y;
-        counts_.lens_samples++;
+    auto draw = [&](u32 dimension, float (&to)[2][CAMERA_LANES]) {
+        with_family(scene_.sampler, [&](auto family) {
+            for (u32 i = 0; i < count; i++) {
+                Vec2 u = sample_2d_of<family.VALUE>(make_sampler(pixel, first_sample + i), dimension);
+                to[0][i] = u.x, to[1][i] = u.y;
+            }
+        });
+    };
+    draw(first_dimension(scene_.sampler) + DIM_PIXEL, filter_u);
+    if (scene_.has_lens) {
+        draw(first_dimension(scene_.sampler) + DIM_LENS, lens_u);
+        counts_.lens_samples += count;
     }
     for (u32 i = 0; i < count; i++) {
         int k = ray_count_++;

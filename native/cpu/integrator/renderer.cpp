@@ -84,6 +84,7 @@ void Renderer::build_all() {
     scene_.filter = &scene_.filter_table;
     scene_.limits = input_.limits;
     scene_.seed = input_.seed;
+    scene_.sampler = input_.sampler;
     scene_.first_sample = input_.first_sample;
     scene_.log2_samples = ceil_log2(std::max(input_.samples_in_all, input_.first_sample + input_.samples));
     scene_.has_lens = input_.camera.aperture_radius > 0.0f || input_.forced.lens;

@@ -58,6 +58,7 @@ struct RenderInput {
     PathLimits limits{};
     FilmSpec film;
     u32 seed = 0, samples = 1;
+    SamplerFamily sampler = SamplerFamily::SOBOL;
     u32 first_sample = 0, samples_in_all = 0;  // as luch.scene.Settings has them
     unsigned threads = 0;
     ForcedWork forced;

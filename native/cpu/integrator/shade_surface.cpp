@@ -64,10 +64,12 @@ void Batch::draw_numbers(const u32* queue, int lit_count) {
         seed[i] = path.sampler.seed, index[i] = path.sampler.index, dimension[i] = path.dimension;
     }
     auto draw = [&](u32 event_dimension, float (&to)[3][SHADE_LANES]) {
-        for (int i = 0; i < lit_count; i++) {
-            Vec3 u = sample_3d(Sampler{seed[i], index[i]}, dimension[i] + event_dimension);
-            to[0][i] = u.x, to[1][i] = u.y, to[2][i] = u.z;
-        }
+        with_family(scene_.sampler, [&](auto family) {
+            for (int i = 0; i < lit_count; i++) {
+                Vec3 u = sample_3d_of<family.VALUE>(Sampler{seed[i], index[i]}, dimension[i] + event_dimension);
+                to[0][i] = u.x, to[1][i] = u.y, to[2][i] = u.z;
+            }
+        });
     };
     if (scene_.has_lights) draw(DIM_LIGHT, scratch_->light_u);
     draw(DIM_BSDF, scratch_->scatter_u);

@@ -26,13 +26,16 @@ extern "C" __global__ void begin_paths(const __grid_constant__ luch::RenderTask 
     u32 px = task.film.x0 + pixel % task.film.width, py = task.film.y0 + pixel / task.film.width;
     FilmWriter writer = film_of_slot(task, slot);
     film_count_samples(writer, pixel, 1u);
-    Sampler sampler = make_sampler(make_pixel_sampler(px, py, task.scene.seed, task.scene.log2_samples), sample);
-    Vec2 lens_u = task.scene.has_lens ? sample_2d(sampler, DIM_LENS) : Vec2{0.5f, 0.5f};
+    u32 camera = first_dimension(task.scene.sampler);
+    SamplerFamily family = family_of(camera);
+    PixelSampler own = make_pixel_sampler(px, py, task.scene.seed, task.scene.log2_samples, family);
+    Sampler sampler = make_sampler(own, sample);
+    Vec2 lens_u = task.scene.has_lens ? sample_2d(sampler, camera + DIM_LENS) : Vec2{0.5f, 0.5f};
     float time = SHUTTER_MIDDLE;
     if (has_motion(task.scene)) task.wave.ray_time[i] = time = path_time(task.scene, sampler, py);
     PathState path;
-    task.wave.rays[i] =
-        begin_path(task.scene, task.film, px, py, sample, sampler, sample_2d(sampler, DIM_PIXEL), lens_u, time, path);
+    Vec2 filter_u = sample_2d(sampler, camera + DIM_PIXEL);
+    task.wave.rays[i] = begin_path(task.scene, task.film, px, py, sample, sampler, filter_u, lens_u, time, path);
     task.wave.ray_slot[i] = slot;
     task.wave.ray_kind[i] = path.visibility;
     store_path(task.wave, slot, path);

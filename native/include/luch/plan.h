@@ -121,6 +121,13 @@
 #ifndef LUCH_PLAN_MOST_LOBES
 #define LUCH_PLAN_MOST_LOBES 12  // Principled alone can make 8
 #endif
+#ifndef LUCH_PLAN_SAMPLER
+#if LUCH_CUDA
+#define LUCH_PLAN_SAMPLER 0  // kernels that draw numbers are compiled again for the other families
+#else
+#define LUCH_PLAN_SAMPLER 3
+#endif
+#endif
 
 namespace luch::plan {
 
@@ -165,6 +172,8 @@ inline constexpr bool CUBIC_IMAGES = LUCH_PLAN_CUBIC_IMAGES;  // images looked u
 inline constexpr bool HALF_IMAGES = LUCH_PLAN_HALF_IMAGES;
 inline constexpr bool FLOAT_IMAGES = LUCH_PLAN_FLOAT_IMAGES;
 inline constexpr int MOST_LOBES = LUCH_PLAN_MOST_LOBES;  // at one point
+inline constexpr u32 SAMPLER = LUCH_PLAN_SAMPLER;  // the one SamplerFamily (sampling/sampler.h) that there is
+inline constexpr u32 ANY_SAMPLER = 3;              // it is asked at run time
 
 // A light that was chosen may have a program to ask for its emission.
 inline constexpr bool SAMPLED_PROGRAMS = EMISSION_PROGRAMS || LAMP_PROGRAMS || (WORLD_PROGRAM && WORLD_SAMPLING);

@@ -11,6 +11,7 @@ from typing import Any
 from luch.effects import effects_of
 from luch.effects.forcing import ALL
 from luch.effects.lobes import possible_in
+from luch.samplers import NAMES
 from luch.scene import Scene
 
 # Define -> effects that need it, by their names in luch.effects; a name that ends in * stands for all that begin so.
@@ -78,23 +79,32 @@ POSSIBLE = {
     "FLOAT_IMAGES": "float images",
 }
 MOST_LOBES = 12  # of plan.h, where general code keeps the likeliest
+SAMPLER = "SAMPLER"  # define -> SamplerFamily
 
 
 def plan_of(scene: Scene, operations: set[str], facts: Mapping[str, Any]) -> dict[str, bool | int]:
     """Which code a scene needs, and the number of lobes at a point at most. operations: names of those that its
     programs hold; facts: core.render.Renderer.device_facts.
     """
+    sampler = {SAMPLER: NAMES.index(scene.settings.sampler)}
     if ALL in scene.settings.force_effects:
-        return dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD, *POSSIBLE], True) | {"MOST_LOBES": MOST_LOBES}
+        return dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD, *POSSIBLE], True) | {"MOST_LOBES": MOST_LOBES} | sampler
     effects, possible = effects_of(scene), possible_in(scene)
     plan: dict[str, bool | int] = {
         define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()
     }
     plan |= {define: name in possible.needs for define, name in POSSIBLE.items()}
     plan["MOST_LOBES"] = min(possible.most_lobes, MOST_LOBES)
+    plan |= sampler
     plan |= {define: bool(facts[name]) for define, name in TOLD.items()}
     plan |= {define: any(name in operations for name in names) for define, names in MADE_BY.items()}
     return plan
+
+
+def sampler_flags(scene: Scene) -> tuple[str, ...]:
+    """For kernels that serve all scenes, where theirs is not the one that those are compiled with."""
+    family = NAMES.index(scene.settings.sampler)
+    return tuple(flags({SAMPLER: family})) if family else ()
 
 
 def flags(plan: Mapping[str, bool | int]) -> list[str]:

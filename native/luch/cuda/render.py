@@ -22,6 +22,7 @@ from luch.adaptive import parts, regions_of
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.memory import Beside, Memory, bytes_per_path
+from luch.cuda.plan import sampler_flags
 from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.timing import TIMED, StageClocks
 from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
@@ -178,11 +179,12 @@ class DeviceRenderer(HostFilm):
         began = time.perf_counter()
         facts, blocks = self._upload()
         self._upload_seconds = time.perf_counter() - began
-        self._paths = load("RENDER_PATHS", self._scene.settings.precision)
+        precision, sampler = self._scene.settings.precision, sampler_flags(self._scene)
+        self._paths = load("RENDER_PATHS", precision, sampler)
         self._clocks = StageClocks()
         self._stages = SceneKernels(facts, blocks, self._scene)
         self._walks = (
-            load("RENDER_WALKS", self._scene.settings.precision, MOVING * facts["moves"] + TIMED * self._timed)
+            load("RENDER_WALKS", precision, MOVING * facts["moves"] + TIMED * self._timed + sampler)
             if facts["subsurface"]
             else None
         )

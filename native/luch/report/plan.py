@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from luch import denoise
+from luch import denoise, samplers
 from luch.effects import Effects
 from luch.effects.removal import REMOVALS
 from luch.scene import Scene, Settings
@@ -85,7 +85,6 @@ def plan(scene: Scene, effects: Effects, accelerator: str = "", triangles: int =
     variants: list[Variant] = []
     absent = [
         "Integrators: path tracing with next event estimation is the only one.",
-        "Samplers: the Owen-scrambled Sobol sequence is the only one.",
         "Adaptive sampling: it acts only on renders that end by an error.",
     ]
     variants.append(Variant(EXACT, "Settings", "takes nothing from the light: what the others are held against",
@@ -95,6 +94,7 @@ def plan(scene: Scene, effects: Effects, accelerator: str = "", triangles: int =
         absent.append(f"Left out of all: {', '.join(settings.without_effects)}, as the scene's settings say.")
     _add_structures(variants, absent, settings, accelerator, triangles)
     _add_precisions(variants, settings)
+    _add_samplers(variants, settings)
     _add_bounces(variants, absent, settings, on)
     _add_shortcuts(variants, settings, on)
     _add_light_sampling(variants, absent, settings, on)
@@ -125,6 +125,12 @@ def _add_precisions(variants: list[Variant], settings: Settings) -> None:
         if kind != settings.precision:
             variants.append(Variant(f"{kind.lower()} precision", "Precision", reason, {"precision": kind},
                                     biased=kind == "FAST" or settings.precision == "FAST", rank=4))  # fmt: skip
+
+
+def _add_samplers(variants: list[Variant], settings: Settings) -> None:
+    for name, family in samplers.FAMILIES.items():
+        if name != settings.sampler:
+            variants.append(Variant(f"{family.title} sampler", "Samplers", family.reason, {"sampler": name}, rank=4))
 
 
 def _add_bounces(variants: list[Variant], absent: list[str], settings: Settings, on: set[str]) -> None:

@@ -304,7 +304,7 @@ class Session:
         variant = found.variant
         cost, low, high = _ratio(found.ratios, self._ratio_spread) if found is not base else (1.0, 1.0, 1.0)
         noise = {n: noise_of(t, self._weight) for n, t in sorted(found.tallies.items()) if t.count >= LEAST_ROUNDS}
-        line = fit_noise(list(noise.items()))
+        line = fit_noise(list(noise.items()), variant.of(self.scene).settings.sampler)
         # What chooses paths otherwise has no bias of its own, but where light is clamped, noise decides what is cut.
         own = base if not variant.biased and not floor_of(base.differences, self._weight).sure else found
         floor = floor_of(own.differences, self._weight)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from luch import samplers
 from luch.accuracy import DARK, F64, NEAR, NORMAL_95, Estimate, box_sum
 from luch.curve import HIGHEST_RATE, Curve
 from luch.scene import F32
@@ -132,12 +133,12 @@ class NoiseLine:
         return float((self.at_one / relmse) ** (1.0 / self.rate)) if relmse > 0.0 else float("inf")
 
 
-def fit_noise(points: list[tuple[int, Measured]]) -> NoiseLine:
+def fit_noise(points: list[tuple[int, Measured]], sampler: str = samplers.DEFAULT) -> NoiseLine:
     """The line through noise at growing numbers of samples: its rate as luch.curve finds it, its height from the last."""
     seen = [(samples, found) for samples, found in points if found.value > 0.0]
     if not seen:
         return NoiseLine(0.0, 1.0)
-    curve = Curve()
+    curve = Curve(sampler)
     for samples, found in seen:
         ratio = float(np.exp(NORMAL_95 * 0.5 * found.spread / found.value))
         told = Estimate(found.error, found.error / ratio, found.error * ratio, 0.0, 0.0, 0.0, 0.0)

@@ -7,7 +7,7 @@
 
 namespace luch {
 
-// Sobol dimensions of one flight through a medium, beside those of the event that follows.
+// Dimensions of one flight through a medium, beside those of the event that follows.
 inline constexpr u32 DIMENSIONS_PER_FLIGHT = 7;
 enum FlightDimension : u32 {
     FLIGHT_DISTANCE,

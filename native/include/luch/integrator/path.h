@@ -36,7 +36,7 @@ struct PathState {
     u32 flags;                // PathFlag | PathMemory
     u32 visibility;           // RayKind of the ray
     Sampler sampler;
-    u32 dimension;
+    u32 dimension;            // of the next event's numbers; its two highest bits say the sampler's family
     u32 sample;               // of its pixel in this render, 0 the first
     u32 pixel;
     u16 bounce, transparent_bounce;
@@ -57,7 +57,7 @@ struct PathLimits {
     float ao_distance;
 };
 
-// Sobol dimensions: the camera takes the first, every event of a path a block of its own.
+// Dimensions of the sampler: the camera takes the first, every event of a path a block of its own.
 inline constexpr u32 DIMENSIONS_CAMERA = 4;
 enum CameraDimension : u32 { DIM_PIXEL, DIM_LENS };  // and time, with the place in the pixel
 inline constexpr u32 DIMENSIONS_PER_EVENT = 4;

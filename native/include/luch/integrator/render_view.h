@@ -30,6 +30,7 @@ struct RenderView {
     u32 seed;
     u32 first_sample;         // of this render: others may take those before
     u32 log2_samples;         // the sampler leaves this much room for each pixel
+    SamplerFamily sampler;
     bool has_lens;            // paths choose a point of the aperture
     bool has_lights;          // anything that sample_light could choose
     bool has_visible_lamps;   // lamps of finite size that rays may meet

@@ -104,7 +104,8 @@ LUCH_FN bool enter_subsurface(PathState& path, const ShadePoints& points, int la
     walk->anisotropy = lobe.extra;
     walk->older = lobe.type != LobeType::SUBSURFACE;
     walk->sampler = path.sampler;
-    walk->dimension = WALK_FIRST_DIMENSION + 2u * WALK_SEQUENCE_STEPS * path.dimension;
+    walk->dimension = (path.dimension & FAMILY_BITS) + WALK_FIRST_DIMENSION +
+                      2u * WALK_SEQUENCE_STEPS * (path.dimension & ~FAMILY_BITS);
     walk->random = hash_u32(path.sampler.seed, path.sampler.index, path.dimension);
     path.dimension += DIMENSIONS_PER_EVENT;  // lit and scattered again where it comes out
     return true;

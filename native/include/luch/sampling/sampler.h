@@ -1,111 +1,102 @@
-// Owen-scrambled Sobol points (Burley 2020, "Practical hash-based Owen scrambling"), padded: every
-// dimension is its own one- or two-dimensional (0, m, s)-net, its order shuffled apart from the
-// others. Stateless and branch-free: any (pixel, sample, dimension) costs the same, in any order,
-// so loops over lanes vectorise and results do not depend on who computes them.
+// The families of points that paths draw their numbers from, a closed list, and which piece of a sequence a pixel takes.
+//
+// A dimension's two highest bits say its family, so that a path carries no word more for the choice; 0 is Sobol's. In all
+// families sample_3d's x and y are sample_2d's.
 #pragma once
-#include "luch/math/vec.h"
-#include "luch/sampling/hash.h"
+#include "luch/plan.h"
+#include "luch/sampling/independent.h"
+#include "luch/sampling/lattice.h"
+#include "luch/sampling/sobol.h"
 
 namespace luch {
 
-struct Sampler {
-    u32 seed;   // scramble: pixels of one seed share a sequence, each its own piece of it
-    u32 index;  // where in the sequence this sample stands
+// In the order of luch/samplers.py.
+enum class SamplerFamily : u32 { SOBOL, INDEPENDENT, LATTICE, COUNT };
+static_assert(u32(SamplerFamily::COUNT) <= plan::ANY_SAMPLER);
+
+inline constexpr u32 FAMILY_SHIFT = 30;
+inline constexpr u32 FAMILY_BITS = 3u << FAMILY_SHIFT;
+
+// To be added to every dimension of a render.
+LUCH_FN u32 first_dimension(SamplerFamily family) { return static_cast<u32>(family) << FAMILY_SHIFT; }
+
+// Kernels know their family when they are compiled.
+LUCH_FN SamplerFamily family_of(u32 dimension) {
+    return static_cast<SamplerFamily>(plan::SAMPLER == plan::ANY_SAMPLER ? dimension >> FAMILY_SHIFT : plan::SAMPLER);
+}
+
+template <SamplerFamily FAMILY>
+LUCH_FN float sample_1d_of(const Sampler& s, u32 dimension) {
+    if constexpr (FAMILY == SamplerFamily::INDEPENDENT) return independent_1d(s, dimension);
+    if constexpr (FAMILY == SamplerFamily::LATTICE) return lattice_1d(s, dimension);
+    return sobol_1d(s, dimension);
+}
+
+template <SamplerFamily FAMILY>
+LUCH_FN Vec2 sample_2d_of(const Sampler& s, u32 dimension) {
+    if constexpr (FAMILY == SamplerFamily::INDEPENDENT) return independent_2d(s, dimension);
+    if constexpr (FAMILY == SamplerFamily::LATTICE) return lattice_2d(s, dimension);
+    return sobol_2d(s, dimension);
+}
+
+template <SamplerFamily FAMILY>
+LUCH_FN Vec3 sample_3d_of(const Sampler& s, u32 dimension) {
+    if constexpr (FAMILY == SamplerFamily::INDEPENDENT) return independent_3d(s, dimension);
+    if constexpr (FAMILY == SamplerFamily::LATTICE) return lattice_3d(s, dimension);
+    return sobol_3d(s, dimension);
+}
+
+// Calls work with a FamilyTag of the family: loops over lanes are compiled for each, and ask once.
+template <SamplerFamily FAMILY>
+struct FamilyTag {
+    static constexpr SamplerFamily VALUE = FAMILY;
 };
 
-LUCH_FN u32 reverse_bits(u32 x) {
-    x = (x >> 16) | (x << 16);
-    x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
-    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
-    x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
-    return ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
+template <typename Work>
+LUCH_FN void with_family(SamplerFamily family, Work&& work) {
+    switch (family) {
+        case SamplerFamily::INDEPENDENT:
+            return work(FamilyTag<SamplerFamily::INDEPENDENT>{});
+        case SamplerFamily::LATTICE:
+            return work(FamilyTag<SamplerFamily::LATTICE>{});
+        default:
+            return work(FamilyTag<SamplerFamily::SOBOL>{});
+    }
 }
 
-// Random nested flips, lowest bit first: bit k of the result depends on bits 0..k of x alone
-// (Laine and Karras 2011; constants by Vegdahl 2021, psychopath.io "Building a better LK hash").
-LUCH_FN u32 scramble_upward(u32 x, u32 seed) {
-    x ^= x * 0x3d20adeau;
-    x += seed;
-    x *= (seed >> 16) | 1u;
-    x ^= x * 0x05526c56u;
-    return x ^ (x * 0x53a22864u);
+#if !LUCH_CUDA
+// Apart, so that the default's calls stay as small as they are.
+LUCH_FN_APART Vec3 sample_other(const Sampler& s, u32 dimension) {
+    // x and y of three coordinates are those of two, and x is that of one.
+    return family_of(dimension) == SamplerFamily::INDEPENDENT ? independent_3d(s, dimension) : lattice_3d(s, dimension);
 }
-
-// Second Sobol coordinate of an index, lowest bit first. Its matrix is Pascal's triangle modulo 2,
-// so bit k is the parity of the index bits whose position contains k (Lucas): five folding steps.
-LUCH_FN u32 pascal_fold(u32 x) {
-    x ^= (x >> 16) & 0x0000ffffu;
-    x ^= (x >> 8) & 0x00ff00ffu;
-    x ^= (x >> 4) & 0x0f0f0f0fu;
-    x ^= (x >> 2) & 0x33333333u;
-    return x ^ ((x >> 1) & 0x55555555u);
-}
-
-// One word of seed per use: multiply, then bring the well-mixed half down, since scramble_upward
-// decides the first digits by the lowest bits.
-LUCH_FN u32 derive_seed(u32 hash, u32 odd_factor) {
-    u32 x = hash * odd_factor;
-    return x ^ (x >> 16);
-}
-
-// Where sample `index` stands in the shuffled order of this dimension. Aligned blocks of 2^k
-// indices stay aligned blocks of 2^k: each is a net of its own.
-LUCH_FN u32 shuffled_index(u32 index, u32 hash) {
-    return reverse_bits(scramble_upward(reverse_bits(index), derive_seed(hash, 0x9e3779b1u)));
-}
+#endif
 
 LUCH_FN float sample_1d(const Sampler& s, u32 dimension) {
-    u32 hash = hash_u32(s.seed, dimension);
-    u32 i = shuffled_index(s.index, hash);
-    return unit_float(reverse_bits(scramble_upward(i, derive_seed(hash, 0x85ebca77u))));
+    if constexpr (plan::SAMPLER != plan::ANY_SAMPLER) return sample_1d_of<SamplerFamily(plan::SAMPLER)>(s, dimension);
+#if !LUCH_CUDA
+    if (family_of(dimension) != SamplerFamily::SOBOL) return sample_other(s, dimension).x;
+#endif
+    return sobol_1d(s, dimension);
 }
 
 LUCH_FN Vec2 sample_2d(const Sampler& s, u32 dimension) {
-    u32 hash = hash_u32(s.seed, dimension);
-    u32 i = shuffled_index(s.index, hash);
-    u32 x = scramble_upward(i, derive_seed(hash, 0x85ebca77u));
-    u32 y = scramble_upward(pascal_fold(i), derive_seed(hash, 0xc2b2ae3du));
-    return {unit_float(reverse_bits(x)), unit_float(reverse_bits(y))};
-}
-
-// Third Sobol coordinate, by bytes of the index: what each byte's bits add, lowest bit first. Direction
-// numbers of the polynomial x^2 + x + 1 with m = 1, 3 (Joe and Kuo 2008, dimension 3).
-struct ThirdSobolTable {
-    u32 by_byte[4][256];
-
-    LUCH_FN constexpr ThirdSobolTable() : by_byte{} {
-        u32 m[32] = {1u, 3u};
-        for (int k = 2; k < 32; ++k) m[k] = (m[k - 1] << 1) ^ (m[k - 2] << 2) ^ m[k - 2];
-        for (int byte = 0; byte < 4; ++byte) {
-            for (u32 value = 0; value < 256u; ++value) {
-                for (int bit = 0; bit < 8; ++bit) {
-                    if (!((value >> bit) & 1u)) continue;
-                    int k = byte * 8 + bit;
-                    // m[k] has k + 1 binary places; as bits of a fraction, first digit lowest.
-                    for (int digit = 0; digit <= k; ++digit) {
-                        if ((m[k] >> (k - digit)) & 1u) by_byte[byte][value] ^= 1u << digit;
-                    }
-                }
-            }
-        }
+    if constexpr (plan::SAMPLER != plan::ANY_SAMPLER) return sample_2d_of<SamplerFamily(plan::SAMPLER)>(s, dimension);
+#if !LUCH_CUDA
+    if (family_of(dimension) != SamplerFamily::SOBOL) {
+        Vec3 u = sample_other(s, dimension);
+        return {u.x, u.y};
     }
-};
-LUCH_CONST ThirdSobolTable THIRD_SOBOL{};
-
-LUCH_FN u32 third_fold(u32 i) {
-    return THIRD_SOBOL.by_byte[0][i & 255u] ^ THIRD_SOBOL.by_byte[1][(i >> 8) & 255u] ^
-           THIRD_SOBOL.by_byte[2][(i >> 16) & 255u] ^ THIRD_SOBOL.by_byte[3][i >> 24];
+#endif
+    return sobol_2d(s, dimension);
 }
 
-// A three-dimensional point of one sequence: x, y form a (0, m, 2)-net, and what a choice by z leaves of
-// them is still well spread (a lamp or a lobe chosen by z, a place on it by x and y).
 LUCH_FN Vec3 sample_3d(const Sampler& s, u32 dimension) {
-    u32 hash = hash_u32(s.seed, dimension);
-    u32 i = shuffled_index(s.index, hash);
-    u32 x = scramble_upward(i, derive_seed(hash, 0x85ebca77u));
-    u32 y = scramble_upward(pascal_fold(i), derive_seed(hash, 0xc2b2ae3du));
-    u32 z = scramble_upward(third_fold(i), derive_seed(hash, 0x27d4eb2fu));
-    return {unit_float(reverse_bits(x)), unit_float(reverse_bits(y)), unit_float(reverse_bits(z))};
+    if constexpr (plan::SAMPLER != plan::ANY_SAMPLER) return sample_3d_of<SamplerFamily(plan::SAMPLER)>(s, dimension);
+#if !LUCH_CUDA
+    if (family_of(dimension) != SamplerFamily::SOBOL) return sample_other(s, dimension);
+#endif
+    return sobol_3d(s, dimension);
 }
 
 // Position of (x, y) on a Hilbert curve that fills a square of 2^levels pixels.
@@ -129,9 +120,11 @@ struct PixelSampler {
 
 // Neighbouring pixels take neighbouring pieces of one sequence (Ahmed and Wonka 2020): their errors
 // then differ, and what noise is left looks fine-grained. log2_samples: the most samples the pixel
-// will ever take, as a power of two; from 2^31 every pixel has a seed of its own instead.
-LUCH_FN PixelSampler make_pixel_sampler(u32 x, u32 y, u32 seed, u32 log2_samples) {
-    u32 room = log2_samples < 32u ? (32u - log2_samples) / 2u : 0u;
+// will ever take, as a power of two; from 2^31 every pixel has a seed of its own instead. So has every pixel of a lattice:
+// one that was moved alike for neighbours would make them err alike.
+LUCH_FN PixelSampler make_pixel_sampler(u32 x, u32 y, u32 seed, u32 log2_samples, SamplerFamily family) {
+    bool shares = log2_samples < 32u && family != SamplerFamily::LATTICE;
+    u32 room = shares ? (32u - log2_samples) / 2u : 0u;
     u32 levels = room < 8u ? room : 8u;
     u32 mask = (1u << levels) - 1u;
     u32 tile_seed = hash_u32(seed, x >> levels, y >> levels);
