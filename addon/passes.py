@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from .settings import effective
+
 
 @dataclass(frozen=True)
 class RenderPass:
@@ -84,6 +86,8 @@ def cryptomatte_depth(view_layer: Any) -> int:
 def _own_passes(view_layer: Any) -> Iterator[RenderPass]:
     """Passes that Luch gives their names, Combined first."""
     yield RenderPass("Combined", "RGBA", "COLOR")
+    if effective(view_layer.id_data, "use_denoising") and _switched_on(view_layer, "cycles.use_denoising"):
+        yield RenderPass("Noisy Image", "RGBA", "COLOR")
     for entry in TABLE:
         switches = [entry.enabled_by, CYCLES_SWITCHES.get(entry.enabled_by, entry.enabled_by)]
         if any(_switched_on(view_layer, switch) for switch in switches):

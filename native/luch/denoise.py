@@ -34,6 +34,7 @@ REMEDY = "Blender carries it; without Blender, install the package `pyoidn` or n
 _FLOAT3, _CPU = 3, 1  # OIDN_FORMAT_FLOAT3, OIDN_DEVICE_TYPE_CPU
 _LESS, _MORE = 64, 384  # pixels along an edge of the pictures that seconds are measured on
 ALBEDO_PASS, NORMAL_PASS = "Denoising Albedo", "Denoising Normal"
+NOISY_PASS = "Noisy Image"  # Cycles' name for the picture before the filter
 
 
 class OidnError(RuntimeError):
@@ -122,6 +123,23 @@ def denoise(combined: F32, albedo: F32 | None = None, normal: F32 | None = None)
         oidn.oidnReleaseDevice(device)
     result = np.array(combined, dtype=np.float32)
     result[..., :3] = images["output"]
+    return result
+
+
+def beside(scene: Scene, render: Render, progress: Watch | None) -> Result:
+    """As `rendered`, with the picture before the filter as a pass of its own, which the film asks for; where nothing is
+    filtered it is Combined."""
+    film = replace(scene.film, passes=[name for name in scene.film.passes if name != NOISY_PASS])
+    kept: dict[str, F32] = {}
+
+    def traced(noisy: Scene, *, progress: Watch | None = None) -> Result:
+        result = render(noisy, progress=progress)
+        kept[NOISY_PASS] = result.passes["Combined"]
+        return result
+
+    plain = replace(scene, film=film)
+    result = rendered(plain, traced, progress) if scene.settings.denoise else traced(plain, progress=progress)
+    result.passes |= kept
     return result
 
 

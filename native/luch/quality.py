@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from luch.accuracy import percent
+from luch.identity import identity_of
 from luch.report import files
 from luch.report.plan import EXACT, Variant, exact_settings
 from luch.report.results import Report, Row
@@ -146,9 +147,10 @@ def rendered(scene: Scene, render: Render, progress: Watch | None) -> Result:
     if settings.quality not in STEPS:
         raise ValueError(f"Settings: quality is {settings.quality!r}; it can be {CUSTOM}, {', '.join(STEPS)}.")
     start = time.perf_counter()
+    report, warnings = _read(settings.quality_report, scene) if settings.quality_report else (None, [])
     try:
-        if settings.quality_report:
-            choice = choose(_read(settings.quality_report, scene), settings.quality)
+        if report is not None:
+            choice = choose(report, settings.quality)
         else:
             choice = pilot(scene, settings.quality, _told_on(progress))
     except Cancelled:  # the render ends at its first question
@@ -161,17 +163,23 @@ def rendered(scene: Scene, render: Render, progress: Watch | None) -> Result:
     result.stats["quality"] = {"step": settings.quality, "choice": choice.name, "settings": choice.settings,
                                "reason": choice.reason, "pilot_seconds": spent}  # fmt: skip
     result.stats["total_seconds"] += spent
+    result.stats["warnings"] = [*result.stats.get("warnings", []), *warnings]
     return result
 
 
-def _read(path: str, scene: Scene) -> Report:
-    """Raises ValueError where it is none, or of another scene."""
+def _read(path: str, scene: Scene) -> tuple[Report | None, list[str]]:
+    """None, and a warning, where it is another scene's. Raises ValueError where it is no report."""
     try:
         report = files.read(Path(path))
     except (OSError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: cannot be read as a report ({error}). Make it again.") from error
+    if report.identity != identity_of(scene):
+        whose = f'of another scene ("{report.scene}")' if report.identity else "older than this Luch"
+        return None, [
+            f"{path}: the report is {whose} and is not used; a pilot chose the settings. Make the report anew."
+        ]
     width, height = scene.film.size
-    return replace(report, full_width=width, full_height=height)
+    return replace(report, full_width=width, full_height=height), []
 
 
 def _told_on(progress: Watch | None) -> Callable[[Told], bool] | None:

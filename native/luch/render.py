@@ -287,6 +287,8 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
         from luch import quality
 
         return quality.rendered(scene, render, progress)
+    if denoise.NOISY_PASS in scene.film.passes:
+        return denoise.beside(scene, render, progress)
     if scene.settings.denoise:
         return denoise.rendered(scene, render, progress)
     if scene.settings.verify:

@@ -44,3 +44,9 @@ def test_the_dial_and_denoising_can_be_asked_for_and_an_error_overrules_a_dial()
     }  # fmt: skip
     assert overrides(("blender", "--", "--luch-error", "0.02"))["quality"] == "CUSTOM"
     assert overrides(("blender", "--", "--luch-samples", "4", "--luch-quality", "HIGH"))["quality"] == "HIGH"
+
+
+def test_the_sampler_is_named_in_any_case() -> None:
+    assert overrides(("blender", "--", "--luch-sampler", "lattice"))["sampler"] == "LATTICE"
+    with pytest.raises(CommandLineError, match="HALTON"):
+        overrides(("blender", "--", "--luch-sampler", "halton"))

@@ -7,6 +7,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+from luch import samplers
 from luch.scene import Light, Scene
 
 from addon.export import export_scene
@@ -185,6 +186,14 @@ def test_an_animated_seed_differs_between_frames_and_repeats(scene: bpy.types.Sc
     assert export().settings.seed == 0
 
 
+def test_the_sampling_pattern_reaches_the_renderer(scene: bpy.types.Scene) -> None:
+    add_camera(scene)
+    assert export().settings.sampler == "SOBOL"
+    for name in samplers.NAMES:
+        scene.luch.sampling_pattern = name
+        assert export().settings.sampler == name
+
+
 def test_samples_of_the_view_layer_win(scene: bpy.types.Scene) -> None:
     add_camera(scene)
     scene.luch.samples = 10
@@ -196,7 +205,9 @@ def test_the_dial_and_denoising_reach_the_renderer(scene: bpy.types.Scene) -> No
     add_camera(scene)
     scene.cycles.use_denoising = True  # as a file that was set up for Cycles
     assert (export().settings.denoise, export().settings.quality) == (True, "CUSTOM")
+    assert "Noisy Image" in export().film.passes
     scene.luch.use_denoising, scene.luch.quality, scene.luch.quality_by_report = False, "GOOD", True
     settings = export().settings
     assert (settings.denoise, settings.quality) == (False, "GOOD")
+    assert "Noisy Image" not in export().film.passes
     assert settings.quality_report.endswith("report.json")

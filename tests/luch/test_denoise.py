@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from luch import denoise
+from luch.render import render
+from support.everything import everything
 
 
 def noisy(noise: float) -> tuple[np.ndarray, np.ndarray]:
@@ -46,3 +48,17 @@ def test_without_the_library_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch)
         assert not denoise.available()
     finally:
         denoise.library.cache_clear()
+
+
+def test_the_picture_before_the_filter_is_a_pass_where_it_is_asked_for() -> None:
+    scene = everything()
+    plain = render(scene).passes
+    scene.settings.denoise = True
+    assert denoise.NOISY_PASS not in render(scene).passes
+    scene.film.passes = ["Combined", denoise.NOISY_PASS]
+    both = render(scene).passes
+    assert set(both) == {"Combined", denoise.NOISY_PASS}
+    assert np.array_equal(both[denoise.NOISY_PASS], plain["Combined"])
+    assert not np.array_equal(both["Combined"], plain["Combined"])
+    scene.settings.denoise = False
+    assert np.array_equal(render(scene).passes[denoise.NOISY_PASS], plain["Combined"])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import denoise, quality, record
+from luch.identity import identity_of
 from luch.render import render
 from luch.report.files import write
 from luch.report.plan import AS_SET, EXACT
@@ -98,12 +99,38 @@ def test_custom_leaves_the_settings_alone() -> None:
 
 def test_a_report_decides_instead_of_a_pilot(tmp_path: Path) -> None:
     kept = report(EXACT_ROW, row(AS_SET, 1.0), row("4 bounces", 0.1, settings={"max_bounces": 4}))
-    write(kept, {}, tmp_path)
     scene = small(quality="DRAFT", quality_report=str(tmp_path / "report.json"))
+    kept.identity = identity_of(scene)
+    write(kept, {}, tmp_path)
     result = render(scene)
     assert result.stats["quality"]["choice"] == "4 bounces"
     with pytest.raises(ValueError, match="nowhere"):
         render(replace(scene, settings=replace(scene.settings, quality_report="nowhere.json")))
+
+
+@pytest.mark.parametrize("identity", ["", "0123456789abcdef"])
+def test_a_report_of_another_scene_is_told_and_a_pilot_chooses(tmp_path: Path, identity: str) -> None:
+    kept = report(EXACT_ROW, row(AS_SET, 1.0), row("4 bounces", 0.1, settings={"max_bounces": 4}))
+    kept.identity = identity
+    write(kept, {}, tmp_path)
+    result = render(small(quality="DRAFT", quality_report=str(tmp_path / "report.json")))
+    told = [text for text in result.stats["warnings"] if "report" in text]
+    assert len(told) == 1 and "a pilot chose" in told[0] and ("another scene" in told[0]) == bool(identity)
+    assert result.stats["quality"]["pilot_seconds"] > 0.1 and result.stats["error"] < 0.2
+
+
+def test_a_scene_stays_the_same_in_other_frames_sizes_and_settings() -> None:
+    scene, other = small(), small(max_bounces=2, quality="GOOD")
+    other.film.width, other.frame = 64, 7
+    other.lights[0].power *= 2.0
+    assert other.instances is not None
+    other.instances.matrix[0, 2, 3] += 0.5
+    assert identity_of(scene) == identity_of(other)
+    other.materials[0].surface = other.materials[1].surface
+    assert identity_of(scene) != identity_of(other)
+    renamed = small()
+    renamed.lights[0].name = "Moon"
+    assert identity_of(scene) != identity_of(renamed)
 
 
 def test_a_step_that_there_is_not_is_told() -> None:

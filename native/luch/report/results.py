@@ -119,6 +119,7 @@ class Report:
     warnings: list[str] = field(default_factory=list)
     cancelled: bool = False
     sentences: list[str] = field(default_factory=list)
+    identity: str = ""  # of the scene (luch.identity); "": made before reports said it
 
     @property
     def pixels(self) -> float:

@@ -19,6 +19,7 @@ import numpy as np
 from luch import denoise
 from luch.accuracy import NORMAL_95
 from luch.effects import effects_of
+from luch.identity import identity_of
 from luch.report.plan import AS_SET, EXACT, Plan, Variant, plan
 from luch.report.results import Point, Report, Row
 from luch.report.shots import GoesOn, Shot, scaled, shoot
@@ -296,7 +297,7 @@ class Session:
             scene_samples=self.scene.settings.samples, device=self._device, seconds_asked=self.seconds,
             seconds=self.spent, reference_samples=self._reference_samples,
             reference_error=math.sqrt(self._truth_relmse), rows=[self._row(f, base) for f in measured],
-            base=base.variant.name, absent=self._plan.absent, unmeasured=[*left_out, *self._unmeasured],
+            base=base.variant.name, identity=identity_of(self.scene), absent=self._plan.absent, unmeasured=[*left_out, *self._unmeasured],
             warnings=self._warnings, cancelled=self.cancelled,
         )  # fmt: skip
 
