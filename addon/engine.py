@@ -81,19 +81,15 @@ class LuchRenderEngine(bpy.types.RenderEngine):
 
     def view_update(self, context: Any, depsgraph: Any) -> None:
         """Something of the file changed, or a 3D view shows Luch for the first time. Tells errors in the view."""
-        self._viewport().update(context, depsgraph, self.get_preview_pixel_size(depsgraph.scene))
-        viewport.watch(self)
+        if view := viewport.of_engine(self):
+            view.update(context, depsgraph, self.get_preview_pixel_size(depsgraph.scene))
+            viewport.watch(self)
 
     def view_draw(self, context: Any, depsgraph: Any) -> None:
         """Draw what there is by now."""
-        self._viewport().draw(context, depsgraph, self)
-        viewport.watch(self)
-
-    def _viewport(self) -> viewport.Viewport:
-        """This engine's own: Blender keeps an engine for each 3D view that it draws."""
-        if not hasattr(self, "view"):
-            self.view = viewport.Viewport()
-        return self.view
+        if view := viewport.of_engine(self):
+            view.draw(context, depsgraph, self)
+            viewport.watch(self)
 
     def _mesh_cache(self, depsgraph: Any) -> MeshCache:
         """The view layer's meshes of the frame before, if the user wants them kept; Blender then keeps this engine."""

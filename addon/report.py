@@ -134,6 +134,9 @@ def viewport_end_line(stats: Mapping[str, Any]) -> str:
         parts.append(f"Error {percent(stats['error'])} % ({low} to {high} %)")
     if stats.get("stopped_by") in record.ENDS:
         parts.append(record.ENDS[stats["stopped_by"]].capitalize())
+    notes = len(stats["warnings"])
+    if notes:
+        parts.append("1 note in the console" if notes == 1 else f"{notes} notes in the console")
     return " | ".join(parts)
 
 

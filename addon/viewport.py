@@ -11,6 +11,7 @@ import functools
 import sys
 import traceback
 import weakref
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -37,14 +38,14 @@ class Viewport:
 
         from .export.cache import MeshCache
 
-        self.preview = Preview(report.viewport_line, report.viewport_end_line, _explain)
+        self._notes = Notes()
+        self.preview = Preview(report.viewport_line, self._notes.end_line, _explain)
         self._cache: MeshCache = MeshCache()
         self._scene: Scene | None = None  # as it was submitted last
         self._view: View | None = None
         self._error = ""
         self._failed_at: tuple[object, ...] = ()  # the view
         self._pixel_size = 1
-        self._told: set[str] = set()
         self._on_screen = PictureOnScreen()
         self.news_seen = -1
         self.watched = False
@@ -102,10 +103,7 @@ class Viewport:
             return
         self._error = ""
         self._scene, self._view = scene, view
-        for warning in scene.warnings:
-            if warning not in self._told:
-                self._told.add(warning)
-                print(f"Luch: {warning}", file=sys.stderr)
+        self._notes.tell(scene.warnings)
         self.preview.submit(scene, view)
 
     def _fail(self, error: BaseException, context: Any) -> None:
@@ -122,6 +120,36 @@ class Viewport:
 
     def stop(self, wait: bool = False) -> None:
         self.preview.stop(wait)
+
+
+class Notes:
+    """What a view's pictures lack or do otherwise, each told once in the console. For any thread."""
+
+    def __init__(self) -> None:
+        self._told: set[str] = set()
+
+    def tell(self, notes: Sequence[str]) -> None:
+        for note in notes:
+            if note not in self._told:
+                self._told.add(note)
+                print(f"Luch: {note}", file=sys.stderr)
+
+    def end_line(self, stats: Mapping[str, Any]) -> str:
+        """The status of a finished picture."""
+        self.tell(stats["warnings"])
+        return report.viewport_end_line(stats)
+
+
+def of_engine(engine: Any) -> Viewport | None:
+    """The engine's own, made at its first call; None: the core cannot be loaded, and the view's status says so."""
+    if not hasattr(engine, "view"):
+        try:
+            engine.view = Viewport()
+        except ImportError as error:
+            engine.update_stats("", report.describe_error(error))
+            return None
+    found: Viewport = engine.view
+    return found
 
 
 def _explain(error: BaseException) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 import threading
 import weakref
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ import bpy
 import numpy as np
 import pytest
 from luch import core
+from luch.cuda import DeviceError
 from luch.scene import Film
 from mathutils import Matrix
 from numpy.typing import NDArray
@@ -222,6 +224,34 @@ def test_what_cannot_be_shown_is_told_once_and_tried_again_at_the_next_change(
     assert view.preview.wait(WAIT_S) and view.preview.picture is not None
     assert np.array_equal(view.preview.picture.pixels, good)
     assert view.text.startswith("Sample")
+
+
+def test_without_its_library_a_view_says_why_and_goes_on_once_it_is_there(
+    room: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    engine = SimpleNamespace(update_stats=lambda _, text: said.append(text))
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "luch.preview", None)
+        assert viewport.of_engine(engine) is None
+    assert len(said) == 1 and said[0].startswith("Luch: its ray tracing core cannot be loaded")
+    assert viewport.of_engine(engine) is viewport.of_engine(engine) is not None
+
+
+def test_what_a_picture_does_otherwise_is_noted_in_the_status_and_told_once(
+    room: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def none() -> None:
+        raise DeviceError("CUDA needs CuPy")
+
+    monkeypatch.setattr("luch.cuda.several.cupy", none)
+    room.luch.device = "CUDA"
+    window, view = Window(), Viewport()
+    shown(view, window)
+    window.look_from(0.0, 0.0, 4.0)
+    shown(view, window)
+    assert view.text.endswith(" | 1 note in the console")
+    assert capfd.readouterr().err.count("Luch: Rendered on the CPU: ") == 1
 
 
 @pytest.mark.promise(17)
