@@ -102,6 +102,7 @@ class MovingAccel {
     py::array_t<u8> any(const FloatArray& rays, const IndexArray& kinds, const FloatArray& times) {
         return with([&](auto& tracer) { return any_of(at_times(tracer, rays, times), pool_, rays, kinds); });
     }
+    bool has_world_apart() const { return trees_ && trees_->has_world_apart(); }
     u64 bytes() const { return accel_ ? accel_->stats().bytes : trees_->stats().bytes; }
     cpu::DeviceImage image() const {
         cpu::DeviceImage out;
@@ -129,6 +130,7 @@ void bind_motion(py::module_& m) {
         .def("closest", &MovingAccel::closest)
         .def("any", &MovingAccel::any)
         .def("bytes", &MovingAccel::bytes)
+        .def("has_world_apart", &MovingAccel::has_world_apart)
         .def("device_image",
              [](const py::object& self) { return device_image(self.cast<MovingAccel&>().image(), self); });
 }

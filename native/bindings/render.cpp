@@ -104,7 +104,7 @@ class PyRenderer {
         facts["lamp_programs"] = lamp_programs;
         facts["visible_lamps"] = scene.has_visible_lamps;
         facts["world_program"] = scene.has_world && !scene.world_emission.constant;
-        facts["one_group"] = renderer_->trees().is_one_group();
+        facts["world_apart"] = renderer_->trees().has_world_apart();
         facts["moves"] = scene.shutter != nullptr;
         facts["trees_move"] = renderer_->trees().moves();
         return facts;

@@ -27,6 +27,7 @@ class ArraySceneTrees {
     }
     py::array_t<u8> any(const FloatArray& rays, const IndexArray& kinds) { return any_of(*trees_, pool_, rays, kinds); }
     bool is_one_group() const { return trees_->is_one_group(); }
+    bool has_world_apart() const { return trees_->has_world_apart(); }
 
     py::dict stats() const {
         cpu::SceneTreesStats s = trees_->stats();
@@ -81,6 +82,7 @@ void bind_scene_trees(py::module_& m) {
         .def("any", &ArraySceneTrees::any)
         .def("stats", &ArraySceneTrees::stats)
         .def("is_one_group", &ArraySceneTrees::is_one_group)
+        .def("has_world_apart", &ArraySceneTrees::has_world_apart)
         .def("left_groups",
              [](const py::object& self) { return left_groups(self.cast<ArraySceneTrees&>().trees(), self); })
         .def(

@@ -60,7 +60,7 @@ def rates(trees: Any, rays: Any, truth: Any, blocked: Any, options: argparse.Nam
         trees.closest(rays, NO_KINDS)
         return [{"kernel": "two_level.h", "mrays_per_s": len(rays) / (time.perf_counter() - began) / 1e6}]
     began, image, depth = time.perf_counter(), trees.device_image(), trees.stats()["depth"]
-    tracer = SceneTracer(*image, "CWBVH", "WATERTIGHT", trees.is_one_group(), trees.left_groups(), depth)
+    tracer = SceneTracer(*image, "CWBVH", "WATERTIGHT", trees.has_world_apart(), trees.left_groups(), depth)
     cupy().cuda.Device().synchronize()
     print(f"  uploaded in {time.perf_counter() - began:.3f} s, groups built there: {len(trees.left_groups())}")
     one, found = "_one" if trees.is_one_group() else "", []

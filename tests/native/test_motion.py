@@ -140,17 +140,20 @@ def test_a_scene_in_which_nothing_moves_has_no_more_bytes() -> None:
     assert scene.build(for_device=True).bytes() == scene.still.trees().stats()["bytes"]
 
 
+@pytest.mark.parametrize("flatten", [0, 10_000_000])
 @pytest.mark.parametrize("kind", ["CWBVH", "BVH2"])
-def test_kernels_give_the_hits_of_the_cpu(place: str, kind: str) -> None:
+def test_kernels_give_the_hits_of_the_cpu(place: str, kind: str, flatten: int) -> None:
+    """With flatten what stands still lies apart in the world, and what moves is looked for after it."""
     scene = Moving()
-    trees = scene.build(kind, for_device=True)
-    tracer = SceneTracer(*trees.device_image(), kind, "WATERTIGHT", False, moves=True)
+    trees = scene.build(kind, for_device=True, flatten=flatten)
+    assert trees.has_world_apart() == (flatten > 0)
+    tracer = SceneTracer(*trees.device_image(), kind, "WATERTIGHT", trees.has_world_apart(), moves=True)
     rays = random_rays(200, scale=4.0)
     times = TIMES[np.arange(len(rays)) % len(TIMES)]
     hits = tracer.closest_of(rays, None, times=times)
-    truth = scene.build().closest(rays, NO_KINDS, times)
+    truth = scene.build(flatten=flatten).closest(rays, NO_KINDS, times)
     same([hits[name] for name in ("t", "prim", "u", "v", "instance")], truth)
-    assert np.array_equal(tracer.any_of(rays, None, times=times), scene.build().any(rays, NO_KINDS, times))
+    assert np.array_equal(tracer.any_of(rays, None, times=times), scene.build(flatten=flatten).any(rays, NO_KINDS, times))
 
 
 def test_a_transform_between_keys_turns_evenly_on_the_short_way() -> None:

@@ -31,7 +31,7 @@ def check_equal(scene: Scene, rays: Any, kinds: Any, kind: str, flatten: int, pr
     """Compares with the CPU's scheme; returns its hits."""
     oracle = scene.build("BVH", flatten, PRECISIONS.index(precision))
     trees = scene.trees(kind, flatten, PRECISIONS.index(precision))
-    tracer = SceneTracer(*trees.device_image(), kind, precision, trees.is_one_group())
+    tracer = SceneTracer(*trees.device_image(), kind, precision, trees.has_world_apart())
     return compare(tracer, oracle, rays, kinds)
 
 
@@ -109,7 +109,7 @@ def test_groups_that_the_device_builds_give_the_same_hits(place: str, flatten: i
     assert len(left) == (2 if flatten == 0 else 1)
     assert trees.is_one_group() == (flatten > 0)
     depth = trees.stats()["depth"]
-    tracer = SceneTracer(*trees.device_image(), "CWBVH", "WATERTIGHT", trees.is_one_group(), left, depth)
+    tracer = SceneTracer(*trees.device_image(), "CWBVH", "WATERTIGHT", trees.has_world_apart(), left, depth)
     truth = scene.build(flatten=flatten)
     compare(tracer, truth, rays, kinds)
     with pytest.raises(TreesTooDeep):

@@ -32,7 +32,6 @@ class TwoLevel final : public Accel {
     void build_top(EntryBoxes boxes, ThreadPool& pool);
     void count();
     NodeRay top_ray(Vec3 origin, Vec3 direction, float t_min) const;
-    void set_world_apart(ScenePlan& plan);
     bool enter(const GroupEntry& entry, const Ray& ray, float time, LaneRay* out) const;
     template <class Count>
     void closest_in_entry(const GroupEntry& entry, const Ray& ray, float time, Hit* hit, Count& count) const;
@@ -74,7 +73,7 @@ TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& f
     stats_.dropped_spheres = plan.dropped_spheres;
     stats_.dropped_pieces = plan.dropped_pieces;
     bool search_entries = choice.wide || choice.kind != StructureKind::BRUTE_FORCE;  // the oracle asks them all
-    set_world_apart(plan);
+    world_ = take_world_apart(plan);
     EntryBoxes boxes;
     // One that moves has a box all the same: many rays pass it by, and its transform is dear.
     if (search_entries && plan.entries.size() > (plan.motion.moves() ? 0u : 1u)) boxes = bound_entries(plan, scene);
@@ -84,16 +83,6 @@ TwoLevel::TwoLevel(const SceneView& scene, const std::vector<std::vector<u8>>& f
     if (boxes.boxes.size()) build_top(std::move(boxes), pool);
     count();
     stats_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-void TwoLevel::set_world_apart(ScenePlan& plan) {
-    std::vector<GroupEntry>& entries = plan.entries;
-    auto still = [](const GroupEntry& entry) { return entry.motion == 0; };
-    auto first = std::find_if(entries.begin(), entries.end(), still);
-    if (first == entries.end() || first->instance != NONE) return;
-    if (std::count_if(entries.begin(), entries.end(), still) != 1) return;
-    world_ = *first;
-    entries.erase(first);
 }
 
 void TwoLevel::build_top(EntryBoxes boxes, ThreadPool& pool) {

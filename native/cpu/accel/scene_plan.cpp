@@ -192,6 +192,17 @@ void count_primitives(const Group& group, AccelStats* stats) {
     for (const LeftOut& of_group : group.left_out) add_left_out(of_group, &stats->left_out);
 }
 
+GroupEntry take_world_apart(ScenePlan& plan) {
+    std::vector<GroupEntry>& entries = plan.entries;
+    auto still = [](const GroupEntry& entry) { return entry.motion == 0; };
+    auto first = std::find_if(entries.begin(), entries.end(), still);
+    if (first == entries.end() || first->instance != NONE) return {};
+    if (std::count_if(entries.begin(), entries.end(), still) != 1) return {};
+    GroupEntry world = *first;
+    entries.erase(first);
+    return world;
+}
+
 EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene) {
     size_t count = plan.entries.size();
     std::vector<Box> boxes(count);

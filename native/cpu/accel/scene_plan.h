@@ -33,6 +33,9 @@ struct EntryBoxes {
     HugeArray<PrimBox> boxes;  // id: the entry; finite
     EntryError error;
 };
+// Takes out the entry of what stands still in the world, where all other entries move: rays look for it first, as if
+// nothing moved. Its visibility is 0 where there is none such. Before bound_entries.
+GroupEntry take_world_apart(ScenePlan& plan);
 EntryBoxes bound_entries(const ScenePlan& plan, const SceneView& scene);
 
 }  // namespace luch::cpu

@@ -64,18 +64,18 @@ class SceneTreesOf final : public SceneTrees {
         auto start = std::chrono::steady_clock::now();
         ScenePlan plan = plan_scene(scene, flatten_triangles);
         build_groups(plan, scene, flags, choice, pool);
-        bool one = plan.entries.size() == 1 && plan.entries[0].instance == NONE;
-        if (!one && !plan.entries.empty()) build_top(plan, scene, pool);
+        GroupEntry world = take_world_apart(plan);
+        if (!plan.entries.empty()) build_top(plan, scene, pool);
         groups_ = std::move(plan.groups);
         motion_ = std::move(plan.motion);
         if (motion_.moves()) view_.motion = &motion_.view;
         for (u32 g = 0; g < groups_.size(); ++g) trace_group(g);
         view_.groups = traced_.data();
         view_.group_count = u32(traced_.size());
-        if (one) {
-            only_group_ = plan.entries[0].group;
-            view_.only = traced_[only_group_];
-            view_.only_visibility = plan.entries[0].visibility;
+        if (world.visibility != 0) {
+            world_group_ = world.group;
+            view_.world = traced_[world_group_];
+            view_.world_visibility = world.visibility;
         }
         count(plan);
         if (OWNS_PRIMITIVES<View> && stats_.depth >= CWBVH_MAX_DEPTH)
@@ -97,8 +97,8 @@ class SceneTreesOf final : public SceneTrees {
             size_t at = small ? array.common_at : 0;
             if (array.bytes == 0) continue;  // its pointer stays what it is: null, or never read
             image.links.push_back({groups, array.group * sizeof(Traced) + array.field, target, at});
-            if (is_one_group() && array.group == only_group_)
-                image.links.push_back({root, offsetof(TwoLevelView<View>, only) + array.field, target, at});
+            if (has_world_apart() && array.group == world_group_)
+                image.links.push_back({root, offsetof(TwoLevelView<View>, world) + array.field, target, at});
         }
         if (view_.motion) motion_.describe(image, root, view_.motion, groups_);
         return root;
@@ -112,13 +112,14 @@ class SceneTreesOf final : public SceneTrees {
             const u8* flags = group.flags.empty() ? nullptr : group.flags.data();
             out.push_back({group.corners.data(), group.corners.size() / 9, flags, {}});
             out.back().places.push_back({GROUPS_BLOCK, g * sizeof(Traced) + offsetof(Traced, structure)});
-            if (is_one_group() && g == only_group_)
-                out.back().places.push_back({0, offsetof(TwoLevelView<View>, only) + offsetof(Traced, structure)});
+            if (has_world_apart() && g == world_group_)
+                out.back().places.push_back({0, offsetof(TwoLevelView<View>, world) + offsetof(Traced, structure)});
         }
         return out;
     }
 
-    bool is_one_group() const override { return view_.only_visibility != 0; }
+    bool has_world_apart() const override { return view_.world_visibility != 0; }
+    bool is_one_group() const override { return has_world_apart() && entries_.empty(); }
     bool moves() const override { return motion_.moves(); }
     StructureKind kind() const override { return kind_; }
     SceneTreesStats stats() const override { return stats_; }
@@ -231,7 +232,7 @@ class SceneTreesOf final : public SceneTrees {
     std::vector<GroupArray> arrays_;
     CommonBlock common_;
     SceneMotion motion_;
-    u32 only_group_ = 0;
+    u32 world_group_ = 0;
     TwoLevelView<View> view_ = {};
     SceneTreesStats stats_;
 };

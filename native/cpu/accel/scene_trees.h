@@ -38,6 +38,8 @@ class SceneTrees {
     virtual u32 append(DeviceImage& image) const = 0;
     // All is one group in the world: kernels made for that (render/trace_one.cuh) may walk it.
     virtual bool is_one_group() const = 0;
+    // One group in the world that rays look for first, beside it (unless it is all) what moves.
+    virtual bool has_world_apart() const = 0;
     // Something in them moves: kernels must be compiled for it (plan::MOTION).
     virtual bool moves() const = 0;
     virtual StructureKind kind() const = 0;

@@ -103,15 +103,16 @@ struct RayClock {
     long long began;
     __device__ __forceinline__ void start() { began = clock64(); }
     template <class Rays>
-    __device__ __forceinline__ void stop(const Rays& rays, u32 index) const {
-        rays.task.ticks[index] = static_cast<u32>(clock64() - began);
+    __device__ __forceinline__ void stop(const Rays& rays, u32 index, bool goes_on = false) const {
+        u32 before = goes_on ? rays.task.ticks[index] : 0u;
+        rays.task.ticks[index] = before + static_cast<u32>(clock64() - began);
     }
 };
 #else
 struct RayClock {
     __device__ __forceinline__ void start() {}
     template <class Rays>
-    __device__ __forceinline__ void stop(const Rays&, u32) const {}
+    __device__ __forceinline__ void stop(const Rays&, u32, bool = false) const {}
 };
 #endif
 template <Precision P>

@@ -2,7 +2,7 @@
 //
 // A module has trace_closest and trace_any: BLOCK of luch/cuda/trace.py threads a block, as many blocks as fit at once;
 // warps fetch rays until there are none. That of the compressed wide tree has trace_closest_one and trace_any_one too,
-// for scenes that are one group in the world, and trace_closest_simple and trace_any_simple, which the race compares.
+// for a group that stands apart in the world, and trace_closest_simple and trace_any_simple, which the race compares.
 #pragma once
 #include "render/trace_plan.cuh"
 

@@ -1,4 +1,4 @@
-// Scenes that are one group in the world: the persistent kernels of rays/, with hits of the scene.
+// The one group in the world that is all of a scene, or all that stands still: the persistent kernels of rays/, with hits of the scene.
 #pragma once
 #include "rays/persistent.cuh"
 #include "render/trace.cuh"
@@ -10,19 +10,19 @@ struct OneGroupRays {
     const TraceTask& task;
 };
 
-__device__ __forceinline__ const Cwbvh& tree_of(const OneGroupRays& rays) { return rays.scene.only.structure; }
+__device__ __forceinline__ const Cwbvh& tree_of(const OneGroupRays& rays) { return rays.scene.world.structure; }
 __device__ __forceinline__ const CurveSet& curves_in(const OneGroupRays& rays) {
-    return rays.scene.only.primitives.curves;
+    return rays.scene.world.primitives.curves;
 }
 __device__ __forceinline__ u32 ray_count(const OneGroupRays& rays) { return ray_count(rays.task); }
 __device__ __forceinline__ u32* next_ray(const OneGroupRays& rays) { return rays.task.next; }
 __device__ __forceinline__ bool load_ray(const OneGroupRays& rays, u32 i, Ray* ray) {
     *ray = ray_of(rays.task, i);
     bool valid = clamp_interval(ray);
-    return valid && (rays.scene.only_visibility & kinds_of(rays.task, i)) != 0u;
+    return valid && (rays.scene.world_visibility & kinds_of(rays.task, i)) != 0u;
 }
 __device__ __forceinline__ void store_hit(const OneGroupRays& rays, u32 i, const RefHit& hit) {
-    rays.task.hits[i] = hit.ref == NONE ? no_scene_hit() : hit_in_scene(rays.scene.only, NONE, hit);
+    rays.task.hits[i] = hit.ref == NONE ? no_scene_hit() : hit_in_scene(rays.scene.world, NONE, hit);
 }
 __device__ __forceinline__ void store_blocked(const OneGroupRays& rays, u32 i, u8 blocked) {
     store_blocked(rays.task, i, blocked);

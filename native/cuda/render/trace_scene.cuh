@@ -1,5 +1,6 @@
 // Scenes of many groups: as the persistent walk of one tree (rays/persistent.cuh), but what the top's leaves hold is
-// entered, and left when the stack is down to what waits at the top.
+// entered, and left when the stack is down to what waits at the top. Where a group stands apart in the world,
+// trace_one.cuh came before: its results are what there is to improve on.
 #pragma once
 #include "rays/persistent.cuh"
 #include "render/trace.cuh"
@@ -64,6 +65,8 @@ struct SceneWalker {
         aside->best = {ray.t_max, NONE, 0.0f, 0.0f};
         blocked = BLOCKED_NOT;
         if (!busy) return finish(rays);
+        if (rays.scene.world_visibility != 0u) begin_after_world(rays, i);
+        if (!busy) return;
         aside->t_min = ray.t_min;
         aside->kinds = kinds_of(rays.task, i);
         aside->tested.direction = ray.direction;  // for go_together
@@ -71,16 +74,30 @@ struct SceneWalker {
         go_to_top(rays.scene, ray);
         group = {0, 0x80000000u};
     }
+    // Nothing of the top can matter behind what the ray met in the world; most rays pass the top by.
+    __device__ __forceinline__ void begin_after_world(const SceneRays& rays, u32 i) {
+        if constexpr (ANY) {
+            blocked = rays.task.blocked[i];
+            busy = blocked != BLOCKED_OPAQUE;
+        } else if (rays.task.hits[i].prim != NONE) {
+            aside->best.t = rays.task.hits[i].t;
+        }
+    }
     __device__ __forceinline__ void finish(const SceneRays& rays) {
         busy = false;
-        aside->stop(rays, aside->index);
+        bool after_world = rays.scene.world_visibility != 0u;
+        aside->stop(rays, aside->index, after_world);
         if constexpr (ANY) {
             rays.task.blocked[aside->index] = blocked;
             return;
         }
         RefHit best = aside->best;
-        rays.task.hits[aside->index] =
-            best.ref == NONE ? no_scene_hit() : hit_of_entry(rays.scene, aside->best_entry, best);
+        if (best.ref == NONE) {
+            if (!after_world) rays.task.hits[aside->index] = no_scene_hit();
+            return;
+        }
+        Hit hit = hit_of_entry(rays.scene, aside->best_entry, best);
+        if (!after_world || comes_first(hit, rays.task.hits[aside->index])) rays.task.hits[aside->index] = hit;
     }
     __device__ __forceinline__ void go_to_top(const TwoLevelView<Cwbvh>& scene, const Ray& ray) {
         nodes = scene.top.nodes;

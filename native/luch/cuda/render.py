@@ -202,7 +202,7 @@ class DeviceRenderer(HostFilm):
         self._arrays = DeviceCopy(blocks, links, left_images)
         self.warnings = _told_images([len(blocks[number][1]) for number in left_images])
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
-                                   facts["one_group"], left, depth, facts["trees_move"], facts["curves"],
+                                   facts["world_apart"], left, depth, facts["trees_move"], facts["curves"],
                                    self._timed)  # fmt: skip
         return facts, blocks
 

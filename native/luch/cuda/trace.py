@@ -50,18 +50,25 @@ def upload_trees(blocks: Blocks, links: Links, left: Left, depth: int) -> Device
 class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
-    def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, one_group: bool, left: Left = (),
+    def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, world_apart: bool, left: Left = (),
                  depth: int = 0, moves: bool = False, curves: bool = False, timed: bool = False) -> None:  # fmt: skip
         """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for.
 
-        left: groups that the device builds, if any; depth: of the trees that were built; moves: something in them does;
-        curves: some group holds hair; timed: `ticks` of closest() and any() are written. Kernels lack the code of what
-        is not asked for. May raise TreesTooDeep.
+        world_apart: one group is all of the scene, or all that stands still where the rest moves; left: groups that the
+        device builds, if any; depth: of the trees that were built; moves: something in them does; curves: some group
+        holds hair; timed: `ticks` of closest() and any() are written. Kernels lack the code of what is not asked for.
+        May raise TreesTooDeep.
         """
         self._trees = upload_trees(blocks, links, left, depth)
         self._module = load(f"TRACE_{kind}", precision, MOVING * moves + CURVES * curves + TIMED_RAYS * timed)
-        one = "_one" if one_group and kind == "CWBVH" else ""
+        one = "_one" if world_apart and kind == "CWBVH" else ""
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
+        # What moves comes after what stands still, which is found as if nothing moved.
+        self._then: dict[str, Kernel] = {}
+        if one and moves:
+            self._then = {
+                kernel.name: self.kernel(kernel.name.removesuffix(one)) for kernel in (self._closest, self._any)
+            }
 
     @property
     def root(self) -> Any:
@@ -94,7 +101,12 @@ class SceneTracer:
         self._launch(self._any, rays, kinds, 0, blocked, count, following, times, ticks)
 
     def _launch(self, kernel: Kernel, *task: int) -> None:
-        kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, [self._trees.root, struct.pack("<8Q", *task)])
+        arguments = [self._trees.root, struct.pack("<8Q", *task)]
+        kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, arguments)
+        then = self._then.get(kernel.name)
+        if then is not None:
+            self.kernel("fetch_anew").launch(1, BLOCK, arguments)
+            then.launch(then.resident_blocks(BLOCK), BLOCK, arguments)
 
     def closest_of(self, rays: Any, kinds: Any = None, kernel: str = "", times: Any = None) -> Any:
         """rays (N, 8) float32, kinds (N,) uint32 or None, times (N,) float32 or None: NumPy in, HIT (N,) out.

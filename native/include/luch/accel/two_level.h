@@ -23,10 +23,10 @@ struct TwoLevelView {
     CwbvhOf<GroupEntry> top;               // none where all is one group
     const TracedGroup<Structure>* groups;
     EntryError error;
-    TracedGroup<Structure> only;           // the one group in the world that is all of the scene,
-    u32 only_visibility;                   // by RayKind; 0: take the top
+    TracedGroup<Structure> world;  // a group in the world that is not in the top: all of the scene, or all that
+    u32 world_visibility;  // stands still where the rest moves; by RayKind. 0: there is none
     u32 group_count;
-    const TraceMotion* motion;             // null: nothing moves
+    const TraceMotion* motion;  // null: nothing moves
 };
 
 template <class Structure>
@@ -115,23 +115,30 @@ struct AnyOfEntries {
     }
 };
 
+// What the top holds, where it comes before `best`. ray: clamped. best: NONE, or of what stands still.
+template <Precision P, class Structure>
+LUCH_FN Hit closest_in_top(const TwoLevelView<Structure>& scene, const Ray& ray, u32 kinds, float time, Hit best) {
+    NoCounters none;
+    ClosestOfEntries<P, Structure> entries = {scene, ray, kinds, time, best};
+    LocalStack<> stack;
+    walk(scene.top, top_ray(scene, ray), stack, entries, none);
+    return entries.best.prim == NONE ? no_scene_hit() : entries.best;
+}
+
 // The ray as it stands in the scene; it sees the instances that share a bit with kinds, as they are at `time`.
 template <Precision P, class Structure>
 LUCH_FN Hit closest_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 kinds,
                         float time = SHUTTER_MIDDLE) {
     Ray ray = given;
     if (!clamp_interval(&ray)) return no_scene_hit();
-    NoCounters none;
-    if (scene.only_visibility != 0u) {
+    Hit best = {ray.t_max, NONE, NONE, 0.0f, 0.0f};
+    if (scene.world_visibility & kinds) {
+        NoCounters none;
         RefHit found = {ray.t_max, NONE, 0.0f, 0.0f};
-        if (scene.only_visibility & kinds)
-            closest_hit<P>(scene.only.structure, scene.only.primitives, ray, &found, none);
-        return found.ref == NONE ? no_scene_hit() : hit_in_scene(scene.only, NONE, found);
+        closest_hit<P>(scene.world.structure, scene.world.primitives, ray, &found, none);
+        if (found.ref != NONE) best = hit_in_scene(scene.world, NONE, found);
     }
-    ClosestOfEntries<P, Structure> entries = {scene, ray, kinds, time, {ray.t_max, NONE, NONE, 0.0f, 0.0f}};
-    LocalStack<> stack;
-    walk(scene.top, top_ray(scene, ray), stack, entries, none);
-    return entries.best.prim == NONE ? no_scene_hit() : entries.best;
+    return closest_in_top<P>(scene, ray, kinds, time, best);
 }
 
 // A Blocked value.
@@ -140,11 +147,10 @@ LUCH_FN u8 any_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 k
     Ray ray = given;
     if (!clamp_interval(&ray)) return BLOCKED_NOT;
     NoCounters none;
-    if (scene.only_visibility != 0u) {
-        if (!(scene.only_visibility & kinds)) return BLOCKED_NOT;
-        return any_hit<P>(scene.only.structure, scene.only.primitives, ray, none);
-    }
-    AnyOfEntries<P, Structure> entries = {scene, ray, kinds, time, BLOCKED_NOT};
+    u8 blocked = BLOCKED_NOT;
+    if (scene.world_visibility & kinds) blocked = any_hit<P>(scene.world.structure, scene.world.primitives, ray, none);
+    if (blocked == BLOCKED_OPAQUE) return blocked;
+    AnyOfEntries<P, Structure> entries = {scene, ray, kinds, time, blocked};
     LocalStack<> stack;
     walk(scene.top, top_ray(scene, ray), stack, entries, none);
     return entries.blocked;
