@@ -20,6 +20,7 @@ class ExportContext:
         self.view_layer: Any = depsgraph.view_layer
         self.result = result
         self.frame: int = depsgraph.scene.frame_current
+        self.displaced: set[int] = set()  # indices into Scene.meshes
         self._images: dict[tuple[Any, ...], int] = {}
         self._kept_images = kept_images
         self._warned: set[str] = set()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .cache import MeshCache
 from .context import ExportContext
 from .derived import object_attributes
+from .displacement import Displaced, displace
 from .hashes import name_hash
 from .lights import export_light
 from .materials import MaterialTable
@@ -66,6 +67,8 @@ class InstanceCollector:
         self._materials = MaterialTable(context)
         self._objects: dict[tuple[int, int, int], int] = {}
         self._mesh_indices: dict[int, int] = {}
+        self._sources: dict[int, Mesh] = {}  # meshes that are displaced, as they were read
+        self._moved: dict[int, Mesh] = {}  # and as they are
         self._hair: dict[tuple[int, int, int], list[int]] = {}
         self._object_column: list[int] = []
         self._matrices: list[bytes] = []  # 16 float32 each, rows
@@ -247,9 +250,28 @@ class InstanceCollector:
                 meshes.append(mesh)
         elif index != NO_OBJECT:  # another object's materials may ask for more
             mesh = self._cache.mesh(subject, parent, wanted, self._context)
-            if mesh is not None:
+            if mesh is not None and mesh is not self._sources.get(index):
                 meshes[index] = mesh
+        if index != NO_OBJECT and subject.type == "MESH" and meshes[index] is not self._moved.get(index):
+            self._displace(index, subject, slots)
         return index
+
+    def _displace(self, index: int, subject: Any, slots: list[int]) -> None:
+        """Move the vertices of a mesh that was read, if its materials do so."""
+        programs = self._materials.displacements(slots)
+        if not programs:
+            return
+        result = self._context.result
+        matrix = np.array(subject.matrix_world, dtype=np.float64)[:3]
+        if not np.isfinite(matrix).all():
+            return
+        random = name_hash(subject.name) / 0xFFFFFFFF
+        location = (float(matrix[0, 3]), float(matrix[1, 3]), float(matrix[2, 3]))
+        owner = Displaced(matrix, location, tuple(subject.color), float(subject.pass_index), random)
+        source = result.meshes[index]
+        result.meshes[index] = displace(source, programs, owner, result.images, self._materials.attributes(slots))
+        self._sources[index], self._moved[index] = source, result.meshes[index]
+        self._context.displaced.add(index)
 
     def _add_light(self, item: Any, subject: Any) -> None:
         parent = item.parent if item.is_instance else subject

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from luch.scene import Program
+
 from .attributes import wishes
 from .context import ExportContext
-from .nodes import compile_material
+from .nodes import compile_displacement, compile_material
 from .nodes.media import medium_of
 from .volumes import clear_surface, is_only_volume
 
@@ -21,6 +23,7 @@ class MaterialTable:
         self._context = context
         self._indices: dict[int, int] = {}
         self._wishes: list[set[str]] = []
+        self._displacements: list[Program | None] = []
         self._override: Any = context.view_layer.material_override
 
     def slots(self, subject: Any, mesh: Any) -> list[int]:
@@ -50,7 +53,15 @@ class MaterialTable:
                 compiled.only_volume = True
             self._context.result.materials.append(compiled)
             self._wishes.append(wishes(compiled.surface))
+            self._displacements.append(displacement := compile_displacement(material, self._context))
+            if displacement is not None:
+                self._wishes[-1] |= wishes(displacement)
         return index
+
+    def displacements(self, indices: list[int]) -> list[Program | None]:
+        """How these materials move surfaces; empty: none does."""
+        found = [self._displacements[index] for index in indices]
+        return found if any(program is not None for program in found) else []
 
     def attributes(self, indices: list[int]) -> set[str]:
         """What these materials read of a mesh."""

@@ -119,6 +119,8 @@ class MotionRecorder:
         elif mesh not in self._shapes and _may_deform(subject, parent):
             if self._context.result.meshes[mesh].curves is not None:
                 self._shapes[mesh] = HairShape(subject.name, keys, modifier)
+            elif mesh in self._context.displaced:
+                self._still[f'object "{subject.name}": its surface is displaced, and does not change its shape'] = None
             elif subject.type == "MESH":
                 self._note_shape(subject, keys, mesh)
 

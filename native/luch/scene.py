@@ -66,6 +66,7 @@ class Mesh:
     # shutter's middle.
     motion_positions: F32 | None = None  # (K, V, 3)
     motion_normals: F32 | None = None  # (K, rows of normals, 3), where it has normals
+    displaced: bool = False  # by its materials, before it came here
 
 
 @dataclass

@@ -106,7 +106,6 @@ def displaced(scene: bpy.types.Scene) -> None:
     ("effect", "ask", "who"),
     [
         ("heterogeneous volumes", uneven_volume, "Leaves"),
-        ("displacement", displaced, "Leaves"),
     ],
 )
 def test_what_is_asked_for_in_vain_is_named(
@@ -117,6 +116,13 @@ def test_what_is_asked_for_in_vain_is_named(
     found = exported(room)[effect]
     assert found.state == "not yet"
     assert who in found.reason
+
+
+def test_a_surface_that_its_material_moves_is_told(room: bpy.types.Scene) -> None:
+    assert exported(room)["displacement"].state == "off"
+    displaced(room)
+    found = exported(room)["displacement"]
+    assert found.on and "moved by their materials" in found.reason
 
 
 @pytest.mark.parametrize(("method", "words"), [("RANDOM_WALK", ""), ("RANDOM_WALK_SKIN", ", by Random Walk (Skin)")])

@@ -14,8 +14,9 @@ from contextlib import contextmanager
 
 import bpy
 from luch import scene
-from luch.shader import ProgramBuilder
+from luch.shader import ProgramBuilder, Vector
 
+from ..displacement import UNDISPLACED_NORMAL
 from .tree import Compiler, Context
 
 FAMILIES = ("converters", "inputs", "vectors", "colors", "textures", "closures")
@@ -25,9 +26,10 @@ for _family in FAMILIES:
 from .inputs import normal  # noqa: E402
 from .vectors import bump_normal  # noqa: E402
 
+MOVES = "DISPLACEMENT"  # Material.displacement_method of what moves vertices and is not shown as bump
 DISPLACEMENT_FILTER_WIDTH = 0.1  # of the stencil that turns displacement into bump, as in Cycles
 
-__all__ = ["Context", "compile_light", "compile_material", "compile_world", "default_material"]
+__all__ = ["Context", "compile_displacement", "compile_light", "compile_material", "compile_world", "default_material"]
 
 _SAMPLING = {"NONE": "NONE", "AUTO": "AUTO", "FRONT": "FRONT", "BACK": "BACK", "FRONT_BACK": "FRONT_BACK"}
 
@@ -125,23 +127,45 @@ def _emit_aovs(compiler: Compiler) -> None:
 def _emit_displacement(compiler: Compiler, material: bpy.types.Material) -> None:
     """Shows displacement as bump: the height is the displacement's component along the normal."""
     output = compiler.tree.get_output_node("CYCLES")
-    if output is None or not compiler.is_linked(output, "Displacement"):
+    if output is None or not compiler.is_linked(output, "Displacement") or material.displacement_method == MOVES:
         return
-    if material.displacement_method != "BUMP":
-        compiler.warn(
-            output, "displaces the surface, which is not supported yet; bump is shown instead", "displacement"
-        )
     b = compiler.builder
     plain = normal(compiler)
+    base = plain if material.displacement_method == "BUMP" else _undisplaced_normal(compiler)
     compiler.surface_normal = bump_normal(
         compiler,
         lambda: b.op1("VECTOR_DOT_PRODUCT", (*compiler.vector(output, "Displacement"), *plain)),
         strength=b.constant(1.0),
         distance=b.constant(1.0),
         filter_width=DISPLACEMENT_FILTER_WIDTH,
-        base=plain,
+        base=base,
         object_space=False,
     )
+
+
+def _undisplaced_normal(compiler: Compiler) -> Vector:
+    """The normal before the surface was moved, world space, on the side of the ray: the whole relief is bump upon it,
+    where a material asks for displacement and bump."""
+    b = compiler.builder
+    x, y, z, *_ = b.op("ATTRIBUTE_VALUE", (), (0, 0, b.attribute(UNDISPLACED_NORMAL)))
+    world = b.op3("VECTOR_TRANSFORM", (x, y, z), (1, 0, 2))
+    back = b.op1("POINT_BACKFACING")
+    side = b.op1("MATH_MULTIPLY_ADD", (back, b.constant(-2.0), b.constant(1.0)))
+    return b.scale(world, side)
+
+
+def compile_displacement(material: bpy.types.Material | None, context: Context) -> scene.Program | None:
+    """How far a surface moves, world space, as emission; None where it stays."""
+    if material is None or material.node_tree is None or material.displacement_method == "BUMP":
+        return None
+    inlined = bpy.types.InlineShaderNodes.from_material(material)
+    compiler = Compiler(inlined.node_tree, f'Material "{material.name}"', context)
+    output = compiler.tree.get_output_node("CYCLES")
+    if output is None or not compiler.is_linked(output, "Displacement"):
+        return None
+    with _deep_trees():
+        compiler.builder.closure("CLOSURE_EMISSION", compiler.vector(output, "Displacement"))
+    return compiler.builder.finish()
 
 
 @contextmanager

@@ -75,6 +75,11 @@ def add_geometry(effects: Effects, shown: Shown) -> None:
         effects.add("Geometry", "point clouds", True, reason, cost="a search of their own for every ray")
     elif "point clouds" not in shown.scene.unsupported:  # as in a file of a Luch that could not draw them
         effects.add("Geometry", "point clouds", False, "the scene has none")
+    moved = [shown.scene.meshes[mesh].name for mesh in shown.uses if shown.scene.meshes[mesh].displaced]
+    if moved:
+        more = f" and {len(moved) - 1} more" if len(moved) > 1 else ""
+        reason = f'"{moved[0]}"{more}: vertices were moved by their materials at export'
+        effects.add("Geometry", "displacement", True, reason, cost="nothing while rendering")
     _add_hair(effects, shown)
 
 
@@ -224,6 +229,8 @@ def add_later(effects: Effects, shown: Shown) -> None:
     told.pop("subsurface", None)  # told with the surfaces
     told.pop("motion blur", None)  # told with what moves
     for name, group, off in _LATER:
+        if name in effects:
+            continue
         _add_missing(effects, group, name, told.pop(name, []), off)
     for name, sentences in told.items():
         if name not in effects:
