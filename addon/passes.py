@@ -49,6 +49,8 @@ TABLE = (
     RenderPass("Reliability", "X", "VALUE", "luch.use_pass_reliability"),
 )
 
+NOISY = RenderPass("Noisy Image", "RGBA", "COLOR")  # Combined before denoising, where that is on, as Cycles has it
+
 # Passes of Cycles that guide its own sampling of volumes: nothing that Luch has.
 NOT_RENDERED = {
     "Volume Scatter": "cycles.use_pass_volume_scatter",
@@ -86,8 +88,6 @@ def cryptomatte_depth(view_layer: Any) -> int:
 def _own_passes(view_layer: Any) -> Iterator[RenderPass]:
     """Passes that Luch gives their names, Combined first."""
     yield RenderPass("Combined", "RGBA", "COLOR")
-    if effective(view_layer.id_data, "use_denoising") and _switched_on(view_layer, "cycles.use_denoising"):
-        yield RenderPass("Noisy Image", "RGBA", "COLOR")
     for entry in TABLE:
         switches = [entry.enabled_by, CYCLES_SWITCHES.get(entry.enabled_by, entry.enabled_by)]
         if any(_switched_on(view_layer, switch) for switch in switches):
@@ -100,15 +100,20 @@ def _own_passes(view_layer: Any) -> Iterator[RenderPass]:
 
 def enabled_aovs(view_layer: Any) -> tuple[list[Any], list[str]]:
     """The AOVs that are rendered, and the names of those that cannot be: another pass has that name."""
-    taken = {entry.name for entry in _own_passes(view_layer)}
+    taken = {NOISY.name, *(entry.name for entry in _own_passes(view_layer))}
     taken |= {f"Combined_{group.name}" for group in view_layer.lightgroups}
     valid = [aov for aov in view_layer.aovs if aov.is_valid]
     return [aov for aov in valid if aov.name not in taken], [aov.name for aov in valid if aov.name in taken]
 
 
-def enabled_passes(view_layer: Any) -> Iterator[RenderPass]:
-    """The passes of a view layer, Combined first, in the order Blender's compositor shows them; no name twice."""
+def enabled_passes(view_layer: Any, scene: Any) -> Iterator[RenderPass]:
+    """The passes of a view layer, Combined first, in the order Blender's compositor shows them; no name twice.
+
+    scene: that of the layer, which does not know it while Blender renders.
+    """
     yield from _own_passes(view_layer)
+    if effective(scene, "use_denoising") and _switched_on(view_layer, "cycles.use_denoising"):
+        yield NOISY
     for aov in enabled_aovs(view_layer)[0]:
         yield RenderPass(aov.name, "X", "VALUE") if aov.type == "VALUE" else RenderPass(aov.name, "RGBA", "COLOR")
     for group in view_layer.lightgroups:
@@ -122,5 +127,5 @@ def missing_passes(view_layer: Any) -> list[str]:
 
 def register_passes(engine: Any, scene: Any, view_layer: Any) -> None:
     """Tell Blender which passes the engine will deliver for a view layer."""
-    for entry in enabled_passes(view_layer):
+    for entry in enabled_passes(view_layer, scene):
         engine.register_pass(scene, view_layer, entry.name, len(entry.channels), entry.channels, entry.kind)

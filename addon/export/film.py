@@ -32,7 +32,7 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
         border=_border(render, width, height),
         pixel_aspect=(render.pixel_aspect_x, render.pixel_aspect_y),
         alpha_threshold=view_layer.pass_alpha_threshold,
-        passes=[entry.name for entry in passes.enabled_passes(view_layer)],
+        passes=[entry.name for entry in passes.enabled_passes(view_layer, scene)],
         cryptomatte_depth=passes.cryptomatte_depth(view_layer),
         lightgroups=[group.name for group in view_layer.lightgroups],
         aovs=[(aov.name, aov.type) for aov in aovs],

@@ -90,6 +90,15 @@ def test_every_pass_arrives_under_blenders_name(room: bpy.types.Scene) -> None:
     assert {name: passes[name].shape[2] for name in expected} == expected
 
 
+def test_the_picture_before_denoising_arrives_where_denoising_is_on(room: bpy.types.Scene) -> None:
+    plain = picture(room)
+    assert "Noisy Image" not in plain
+    room.luch.use_denoising = True
+    denoised = picture(room)
+    assert np.array_equal(denoised["Noisy Image"], plain["Combined"])
+    assert not np.array_equal(denoised["Combined"], plain["Combined"])
+
+
 def test_an_aov_may_have_the_name_of_a_pass_that_is_off(room: bpy.types.Scene) -> None:
     layer = room.view_layers[0]
     for name in ("Depth", "Error", "Sample Count", "Combined_Key", "CryptoObject00"):

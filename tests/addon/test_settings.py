@@ -53,14 +53,14 @@ def test_passes_follow_the_view_layer(scene: bpy.types.Scene) -> None:
     aov.name = "Mask"
     aov.type = "VALUE"
     layer.lightgroups.add().name = "Key"
-    names = [entry.name for entry in passes.enabled_passes(layer)]
+    names = [entry.name for entry in passes.enabled_passes(layer, scene)]
     assert names == ["Combined", "Depth", "CryptoObject00", "CryptoObject01", "Mask", "Combined_Key"]
 
 
 def test_a_pass_asked_of_cycles_is_delivered_by_luch(scene: bpy.types.Scene) -> None:
     layer = scene.view_layers[0]
     layer.cycles.denoising_store_passes = True
-    names = {entry.name for entry in passes.enabled_passes(layer)}
+    names = {entry.name for entry in passes.enabled_passes(layer, scene)}
     assert {"Denoising Albedo", "Denoising Normal"} <= names
 
 
