@@ -47,6 +47,9 @@ LOBES: dict[str, tuple[str, dict[str, Any], int]] = {
     "toon": ("toon", {"size": 0.4, "smooth": 2 / 3 - 0.4}, CAMERA),  # its rim lies on a bin edge
     "toon glossy": ("toon", {"size": 0.3, "smooth": 0.2, "glossy": True}, CAMERA),
     "conductor": ("metallic", {"physical": True}, CAMERA),
+    "metal of edge tints": ("metallic", {"roughness": 0.4, "edge_tint": 0.3}, CAMERA),
+    "film on metal": ("metallic", {"roughness": 0.4, "thin_film_thickness": 400.0}, CAMERA),
+    "film on glass": ("glass", {**GLOSSY, "thin_film_thickness": 400.0}, CAMERA),
     "principled": ("principled", {"coat_weight": 0.5, "coat_roughness": 0.4, "sheen_weight": 0.5}, CAMERA),
     "thin glass": ("principled", {"thin_wall": True, "transmission_weight": 1.0}, CAMERA),
     "thin subsurface": (
