@@ -257,7 +257,7 @@ def test_what_a_picture_does_otherwise_is_noted_in_the_status_and_told_once(
 @pytest.mark.promise(17)
 def test_after_edits_at_high_rate_a_view_shows_the_last_state(room: bpy.types.Scene) -> None:
     window, view = Window(), Viewport()
-    edits(200, 2.0, window, view)
+    edits(120, 1.0, window, view)
     assert view.preview.wait(WAIT_S) and view.preview.picture is not None, view.text
     assert np.array_equal(view.preview.picture.pixels, shown(Viewport(), window))
 

@@ -61,7 +61,7 @@ def test_the_scene_submitted_last_is_drawn_and_a_stale_one_is_dropped_within_a_t
     waits = []
     for _ in range(5):
         preview.submit(long)
-        time.sleep(0.3)
+        time.sleep(0.1)
         version, began = preview.submit(last), time.perf_counter()
         while preview.picture is None or preview.picture.version != version:
             time.sleep(0.001)
