@@ -49,10 +49,21 @@ class LuchRenderEngine(bpy.types.RenderEngine):
         """One view layer of one frame. Whatever goes wrong ends as a sentence for the user: an exception that got
         through here would count as a finished render, or crash Blender when it saves the file."""
         try:
-            self._render(depsgraph)
+            for view in self._views(depsgraph):
+                self.active_view_set(view)
+                self._render(depsgraph)
         except BaseException as error:  # of scripts in drivers and handlers too: SystemExit would end Blender
             traceback.print_exc()
             self.report({"ERROR"}, describe_error(error))
+
+    def _views(self, depsgraph: Any) -> list[str]:
+        """Names of the eyes to render; one without a name where the scene is not stereoscopic."""
+        if not depsgraph.scene.render.use_multiview or self.is_preview or _receiver is not None:
+            return [self.active_view_get()]
+        asked = self.begin_result(0, 0, 1, 1, layer=depsgraph.view_layer.name)
+        names = [view.name for view in asked.views]
+        self.end_result(asked, cancel=True)
+        return names
 
     def _render(self, depsgraph: Any) -> None:
         from luch import render

@@ -31,7 +31,7 @@ def export_camera(subject: Any, context: ExportContext, engine: Any) -> Camera:
     data: Any = subject.data
     camera = Camera(
         kind=_kind(data, context),
-        matrix=camera_matrix(subject),
+        matrix=camera_matrix(subject, engine if context.scene.render.use_multiview else None),
         lens_mm=data.lens,
         sensor_width_mm=data.sensor_width,
         sensor_height_mm=data.sensor_height,
@@ -73,9 +73,11 @@ def add_panorama(camera: Camera, data: Any) -> None:
     )
 
 
-def camera_matrix(subject: Any) -> F64:
-    """Camera to world, (3, 4), of an evaluated camera."""
-    return _rigid(np.array(subject.matrix_world, dtype=np.float64))[:3]
+def camera_matrix(subject: Any, views: Any = None) -> F64:
+    """Camera to world, (3, 4), of an evaluated camera. views: the engine, which knows the eye that it renders now, where
+    there are several."""
+    seen = subject.matrix_world if views is None else views.camera_model_matrix(subject)
+    return _rigid(np.array(seen, dtype=np.float64))[:3]
 
 
 def _rigid(matrix: F64) -> F64:

@@ -98,7 +98,10 @@ def _export_motion(context: ExportContext, cache: MeshCache, engine: Any, shutte
     try:
         with recorder.at_middle():
             collector = export_instances(context, cache, recorder)
-            recorder.follow(context.result.camera, lambda: _camera(context, engine), camera_matrix)
+            views = engine if context.scene.render.use_multiview else None
+            recorder.follow(
+                context.result.camera, lambda: _camera(context, engine), lambda camera: camera_matrix(camera, views)
+            )
     finally:
         cache.clear()
     recorder.finish(collector.kept)
@@ -112,9 +115,10 @@ def _warn_about_what_is_missing(context: ExportContext) -> None:
             f'View layer "{context.view_layer.name}" asks for the pass Vector, which Luch does not write: motion blur'
             " takes its place."
         )
-    if render.use_multiview:
+    camera: Any = context.scene.camera.data if context.scene.camera is not None else None
+    if render.use_multiview and camera is not None and camera.type == "PANO" and camera.stereo.use_spherical_stereo:
         context.warn(
-            f'Scene "{context.scene.name}" is stereoscopic; Luch draws every view from the same camera.', "stereoscopy"
+            f'Camera "{camera.name}" asks for spherical stereo; Luch draws each eye as one panorama.', "stereoscopy"
         )
 
 

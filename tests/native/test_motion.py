@@ -153,7 +153,9 @@ def test_kernels_give_the_hits_of_the_cpu(place: str, kind: str, flatten: int) -
     hits = tracer.closest_of(rays, None, times=times)
     truth = scene.build(flatten=flatten).closest(rays, NO_KINDS, times)
     same([hits[name] for name in ("t", "prim", "u", "v", "instance")], truth)
-    assert np.array_equal(tracer.any_of(rays, None, times=times), scene.build(flatten=flatten).any(rays, NO_KINDS, times))
+    assert np.array_equal(
+        tracer.any_of(rays, None, times=times), scene.build(flatten=flatten).any(rays, NO_KINDS, times)
+    )
 
 
 def test_a_transform_between_keys_turns_evenly_on_the_short_way() -> None:

@@ -26,7 +26,7 @@ _COUNTS_BYTES = 4  # samples of a pixel
 
 # What the exporter meets and Luch cannot draw: effect, group, why it is off where nothing was met.
 _LATER = (
-    ("stereoscopy", "Camera", "the scene is not stereoscopic"),
+    ("stereoscopy", "Camera", "no panorama asks for spherical stereo"),
     ("heterogeneous volumes", "Geometry", "no volume changes from place to place"),
     ("displacement", "Geometry", "no material displaces its surface"),
     ("light linking", "Light", "no object uses it"),
