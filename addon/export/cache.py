@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from luch.scene import Mesh
 
@@ -13,7 +13,10 @@ from .context import ExportContext
 from .curves import export_curves
 from .kept_images import KeptImages
 from .meshes import export_mesh
+from .particles import export_hair
 from .points import export_points
+
+Key = TypeVar("Key")
 
 
 @dataclass
@@ -33,6 +36,7 @@ class MeshCache:
 
     def __init__(self) -> None:
         self._entries: dict[int, _Entry] = {}
+        self._hair: dict[tuple[int, str], _Entry] = {}
         self._generation = 0
         self.images = KeptImages()
         self.read_count = 0  # meshes copied out of Blender so far
@@ -40,17 +44,37 @@ class MeshCache:
     def clear(self) -> None:
         """Forget all meshes."""
         self._entries.clear()
+        self._hair.clear()
 
     def begin(self, depsgraph: Any) -> None:
         """Start a frame: forget what changed and what the last frame did not use."""
-        changed = {update.id.original.session_uid for update in depsgraph.updates if update.is_updated_geometry}
-        self._entries = {
-            address: entry
-            for address, entry in self._entries.items()
+        updates = [(update.id.original.session_uid, update.is_updated_geometry) for update in depsgraph.updates]
+        changed = {uid for uid, geometry in updates if geometry}
+        self._entries = self._lasting(self._entries, changed)
+        self._hair = self._lasting(self._hair, changed)
+        self._generation += 1
+        self.images.begin({uid for uid, _ in updates})
+
+    def _lasting(self, entries: dict[Key, _Entry], changed: set[int]) -> dict[Key, _Entry]:
+        return {
+            key: entry
+            for key, entry in entries.items()
             if entry.generation == self._generation and not (entry.owners & changed)
         }
-        self._generation += 1
-        self.images.begin({update.id.original.session_uid for update in depsgraph.updates})
+
+    def hair(self, subject: Any, modifier: Any, system: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
+        """Curves of a particle system, kept for 3D views alone: Blender tells points one by one; None: no hair."""
+        if not context.for_view:
+            return export_hair(subject, modifier, system, wanted, context)
+        key = (subject.original.session_uid, modifier.name)
+        entry = self._hair.get(key)
+        if entry is None or not wanted <= entry.wanted:
+            owners = {datablock.original.session_uid for datablock in (subject, subject.data, system.settings)}
+            mesh = export_hair(subject, modifier, system, wanted, context)
+            self.read_count += 1
+            entry = self._hair[key] = _Entry(mesh, wanted, owners, self._generation)
+        entry.generation = self._generation
+        return entry.mesh
 
     def mesh(self, subject: Any, parent: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
         """The exported mesh of an object's evaluated data with at least the wanted attributes; None: nothing to draw."""

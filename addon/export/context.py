@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 class ExportContext:
     """Carried through one export. Node compilers use `image_index`, `warn` and `object_matrix`."""
 
-    def __init__(self, depsgraph: Any, result: Scene, kept_images: KeptImages | None = None) -> None:
+    def __init__(
+        self, depsgraph: Any, result: Scene, kept_images: KeptImages | None = None, for_view: bool = False
+    ) -> None:
         self.depsgraph = depsgraph
         self.scene: Any = depsgraph.scene
         self.view_layer: Any = depsgraph.view_layer
@@ -22,6 +24,7 @@ class ExportContext:
         self.frame: int = depsgraph.scene.frame_current
         self.displaced: set[int] = set()  # indices into Scene.meshes
         self._images: dict[tuple[Any, ...], int] = {}
+        self.for_view = for_view  # a 3D viewport, else a render
         self._kept_images = kept_images
         self._warned: set[str] = set()
 

@@ -18,7 +18,7 @@ from .hashes import name_hash
 from .lights import export_light
 from .materials import MaterialTable
 from .motion import MotionRecorder
-from .particles import export_hair, hair_systems
+from .particles import hair_systems
 from .told import Instancers, told_wishes
 from .visibility import instance_visibility
 from .volumes import warn_about_smoke
@@ -160,7 +160,7 @@ class InstanceCollector:
     def add_hair(self, item: Any) -> None:
         """Particle hair of an instance: an object of its own for each system."""
         subject = item.object
-        if subject.type != "MESH" or not (systems := hair_systems(subject)):
+        if subject.type != "MESH" or not (systems := hair_systems(subject, self._context.for_view)):
             return
         parent = item.parent if item.is_instance else subject
         source = item.instance_object if item.is_instance else subject
@@ -226,7 +226,7 @@ class InstanceCollector:
         return index
 
     def _hair_index(self, subject: Any, hair: tuple[Any, Any], slots: list[int]) -> int:
-        mesh = export_hair(subject, *hair, self._materials.attributes(slots), self._context)
+        mesh = self._cache.hair(subject, *hair, self._materials.attributes(slots), self._context)
         if mesh is None:
             return NO_OBJECT
         self._context.result.meshes.append(mesh)

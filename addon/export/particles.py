@@ -15,13 +15,13 @@ from .curves import NOT_FOR_SHADERS, derived, mesh_of
 _STRAYS = 16.0  # units in the last place of a path's coordinates, through Blender's transforms and back
 
 
-def hair_systems(subject: Any) -> list[tuple[Any, Any]]:
-    """(modifier, particle system) of what an evaluated object draws as hair."""
+def hair_systems(subject: Any, for_view: bool = False) -> list[tuple[Any, Any]]:
+    """(modifier, particle system) of what an evaluated object draws as hair, in renders or in 3D views."""
     return [
         (modifier, modifier.particle_system)
         for modifier in subject.modifiers
         if modifier.type == "PARTICLE_SYSTEM"
-        and modifier.show_render
+        and (modifier.show_viewport if for_view else modifier.show_render)
         and modifier.particle_system.settings.type == "HAIR"
         and modifier.particle_system.settings.render_type == "PATH"
     ]
@@ -37,13 +37,20 @@ class Grown:
     noise: float  # how far a place may stray: Blender tells it in the world, in single precision
 
 
-def grow(subject: Any, system: Any) -> Grown | None:
-    """Every path of an evaluated system, or of its children where it has those; None if there is none."""
+def grow(subject: Any, system: Any, for_view: bool = False) -> Grown | None:
+    """Every path of an evaluated system, or of its children where it has those; None if there is none. 3D views have
+    their own number of steps and share of the children."""
     settings = system.settings
     parents, children = len(system.particles), len(system.child_particles)
+    if for_view:
+        children = children * settings.display_percentage // 100
     start = 0 if children == 0 or settings.child_type == "NONE" else parents
     numbers = range(start, parents + children)
-    steps = (1 << settings.render_step) + 1 + (settings.kink_extra_steps if settings.kink == "SPIRAL" else 0)
+    steps = (
+        (1 << (settings.display_step if for_view else settings.render_step))
+        + 1
+        + (settings.kink_extra_steps if settings.kink == "SPIRAL" else 0)
+    )
     if not numbers:
         return None
     world = np.array(
@@ -67,7 +74,7 @@ def grow(subject: Any, system: Any) -> Grown | None:
 
 def export_hair(subject: Any, modifier: Any, system: Any, wanted: set[str], context: ExportContext) -> Mesh | None:
     """Curves of one system; None if it has none."""
-    grown = grow(subject, system)
+    grown = grow(subject, system, context.for_view)
     if grown is None:
         return None
     count = len(grown.numbers)

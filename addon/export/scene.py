@@ -51,7 +51,7 @@ def export_scene(
 def export_view_scene(depsgraph: Any, region: Any, space: Any, cache: MeshCache) -> tuple[Scene, View]:
     """The same as a region of a 3D viewport shows it, at an instant; and the view. Raises ValueError as export_scene."""
     result = Scene(name=depsgraph.scene.name, frame=depsgraph.scene.frame_current)
-    context = ExportContext(depsgraph, result, cache.images)
+    context = ExportContext(depsgraph, result, cache.images, for_view=True)
     cache.begin(depsgraph)
     _warn_about_what_is_missing(context)
     _warn_about_what_views_miss(context, space)

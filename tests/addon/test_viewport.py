@@ -35,6 +35,7 @@ from support.viewports import (
     perspective,
     room_with_a_cube,
     shown,
+    update,
 )
 
 from addon import report, viewport
@@ -322,10 +323,31 @@ def test_update_after_update_a_view_takes_no_more_memory_or_threads(room: bpy.ty
         bpy.data.objects["Cube"].location.x = 0.01 * number
         bpy.data.meshes["Cube"].vertices[0].co.x += 0.001
         bpy.data.meshes["Cube"].update()
-        view.update(window, depsgraph())
+        update(view, window)
         if number % 10 == 9:  # the others are cut off by the next
             shown(view, window)
         if number in (29, 99):
             marks.append(footprint())
     assert marks[1][0] - marks[0][0] < 0.1 * 70, marks
     assert marks[1][1] == marks[0][1]
+
+
+def test_particle_hair_is_read_again_when_it_changes_and_not_else(room: bpy.types.Scene) -> None:
+    cube = bpy.data.objects["Cube"]
+    bpy.context.view_layer.objects.active = cube
+    bpy.ops.object.particle_system_add()
+    settings = cube.particle_systems[0].settings
+    settings.type, settings.count, settings.display_step, settings.render_step = "HAIR", 20, 2, 5
+    window, view = Window(), Viewport()
+    shown(view, window)
+    curves = view._scene.meshes[-1].curves
+    assert curves.points.shape == (20 * 5, 4)  # steps of views, not of renders
+    bpy.data.objects["Sun"].location.z += 0.1
+    shown(view, window)
+    assert view._scene.meshes[-1].curves is curves
+    settings.hair_length = 0.5
+    before = view.preview.picture
+    shown(view, window)
+    assert view._scene.meshes[-1].curves is not curves
+    assert not np.array_equal(view.preview.picture.pixels, before.pixels)
+    assert np.array_equal(view.preview.picture.pixels, shown(Viewport(), window))

@@ -64,9 +64,25 @@ def depsgraph() -> Any:
     return bpy.context.evaluated_depsgraph_get()
 
 
+def update(view: Any, window: Window) -> None:
+    """As Blender does it: within the evaluation of what was edited, which alone knows what that was."""
+    told: list[Any] = []
+
+    def tell(_: Any, graph: Any) -> None:
+        told.append(graph)
+        view.update(window, graph)
+
+    handlers: list[Any] = bpy.app.handlers.depsgraph_update_post
+    handlers.append(tell)
+    bpy.context.view_layer.update()
+    handlers.remove(tell)
+    if not told:
+        view.update(window, depsgraph())
+
+
 def shown(view: Any, window: Window) -> F32:
     """The finished picture of the file as it is."""
-    view.update(window, depsgraph())
+    update(view, window)
     assert view.preview.wait(WAIT_S) and view.preview.picture is not None, view.text
     return view.preview.picture.pixels
 
@@ -102,8 +118,7 @@ def edits(count: int, seconds: float, window: Window, view: Any) -> None:
     rng, began = np.random.default_rng(3), time.perf_counter()
     for number in range(count):
         moved = edit(rng, window)
-        graph = depsgraph()
         if not moved:
-            view.update(window, graph)
-        view.follow(window, graph)
+            update(view, window)
+        view.follow(window, depsgraph())
         time.sleep(max(0.0, began + seconds * (number + 1) / count - time.perf_counter()))
