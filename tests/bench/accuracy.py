@@ -14,6 +14,7 @@ For each scene, small, against a picture converged by Luch itself (its noise is 
   adaptive  as A4 and A5, with samples where the error is
   --cycles  Cycles ended by its noise threshold against its own converged picture, and Luch asked for the same error
 
+--sampler takes several families of points, a row for each scene and family, all against one reference.
 After every row it rewrites out/bench/accuracy.json and, with --write, the tables of docs/accuracy.md. --append keeps the
 rows that are there, of the same code and options, and measures those that are missing; --seconds begins no row after so
 long: several short calls fill one table. Scenes are looked for as by build.py bench scenes.
