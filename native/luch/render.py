@@ -36,6 +36,7 @@ STEP_SECONDS = 4.0
 # to a half apart. A look takes about so many seconds a pixel on one processor of 2024, until one was measured.
 LOOK_SHARE = 0.007
 LOOK_SECONDS = 0.7e-6
+CANCEL_LOOK_SECONDS = 0.2  # the longest that who cancels waits for: a look at 3840 x 2160 pixels takes seconds
 QUICK_LOOK_SECONDS = 0.02  # taken however short the render, where an error is asked for
 # What reading passes takes at the end of a render that may only take so long; seconds a pixel and channel.
 PASS_SECONDS = 4e-9
@@ -207,6 +208,8 @@ class _Loop:
 
     def _look(self, last: bool) -> None:
         """A point of the curve: where the rule of stopping wants one and it costs next to nothing, and at the end."""
+        if last and self.cancelled and self._look_cost > CANCEL_LOOK_SECONDS:
+            return
         points = self.curve.points
         seen = bool(points) and points[-1][0] == self.done
         if last and seen and (self.cancelled or self.timed_out):

@@ -7,7 +7,9 @@ import time
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from luch import core
+from luch.render import Progress, render
 from luch.scene import Scene
 from support.endings import veils
 
@@ -52,3 +54,21 @@ def test_what_a_cancelled_render_has_drawn_is_what_it_would_have_drawn() -> None
     assert drawn.any() and not drawn.all() and not counts[~drawn].any()
     expected, found = whole.passes()["Combined"], cut.passes()["Combined"]
     assert np.array_equal(found[drawn], expected[drawn]) and not found[~drawn].any()
+
+
+@pytest.mark.parametrize(("seconds_a_pixel", "looked"), [(1e-9, True), (1e-2, False)])
+def test_who_cancels_does_not_wait_for_an_estimate_that_takes_long(
+    monkeypatch: pytest.MonkeyPatch, seconds_a_pixel: float, looked: bool
+) -> None:
+    """At 3840 x 2160 pixels two processors took 3 s for it, after the no."""
+    monkeypatch.setattr("luch.render.LOOK_SECONDS", seconds_a_pixel)
+    monkeypatch.setattr("luch.render.LOOK_SHARE", 0.0)
+    scene = small(veils(count=5), 64)
+    scene.settings = replace(scene.settings, samples=1 << 16, estimate_error=True)
+
+    def enough(progress: Progress) -> bool:
+        return progress.preparing or progress.samples < 4
+
+    result = render(scene, progress=enough)
+    assert result.stats["stopped_by"] == "cancel" and result.stats["samples"] >= 4
+    assert ("error" in result.stats) == looked
