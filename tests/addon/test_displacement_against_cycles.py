@@ -36,8 +36,16 @@ def ball(material: bpy.types.Material, smooth: bool = True) -> bpy.types.Object:
     return subject
 
 
-@pytest.mark.parametrize("coordinates", ["Generated", "Object", "UV", "Normal"])
-@pytest.mark.parametrize("output", ["Position", "Normal"])
+@pytest.mark.parametrize(
+    ("coordinates", "output"),
+    [
+        ("Generated", "Position"),
+        ("Object", "Position"),
+        ("UV", "Position"),
+        ("Normal", "Position"),
+        ("Object", "Normal"),
+    ],
+)
 def test_vertices_move_where_cycles_moves_them(
     scene: bpy.types.Scene, render: Render, coordinates: str, output: str
 ) -> None:

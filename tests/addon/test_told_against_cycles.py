@@ -92,7 +92,7 @@ def particles(material: bpy.types.Material) -> None:
         bpy.context.scene.frame_set(frame)
 
 
-@pytest.mark.parametrize("output", ["Index", "Random", "Age", "Lifetime", "Location", "Size", "Velocity"])
+@pytest.mark.parametrize("output", ["Index", "Random", "Age", "Size", "Velocity"])
 def test_instances_show_what_their_particle_is(scene: bpy.types.Scene, render: Render, output: str) -> None:
     particles(show("ShaderNodeParticleInfo", output))
     look_down(scene, 6.0)
