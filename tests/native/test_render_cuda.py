@@ -60,6 +60,16 @@ def plain() -> Scene:
                    materials=[Material("Chalk", program(chalk))], world=None)  # fmt: skip
 
 
+@pytest.mark.parametrize("kind", ["FISHEYE_EQUIDISTANT", pytest.param("FISHEYE_EQUISOLID", marks=pytest.mark.cuda)])
+def test_a_fisheyes_circle_is_the_cpus_and_nothing_is_seen_beside_it(place: str, kind: str) -> None:
+    scene = everything()
+    lens = replace(scene.camera, kind=kind, fisheye_fov=2.5, fisheye_lens_mm=8.0)
+    cpu, _, ours, _ = both(replace(scene, camera=lens))
+    check_equal("Combined", cpu["Combined"], ours["Combined"], place)
+    assert (ours["Combined"][0, 0] == (0.0, 0.0, 0.0, 1.0)).all()
+    assert ours["Combined"][..., :3].any()
+
+
 def chalk(builder: ProgramBuilder) -> None:
     closure(builder, "CLOSURE_DIFFUSE", {"color": (0.6, 0.5, 0.4)})
 
