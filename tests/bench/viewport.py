@@ -1,6 +1,6 @@
 """Edits at high rate: view_update so many times in so many seconds, then the view must show the last state.
 
-  .venv/bin/python tests/bench/viewport.py [--edits 1000] [--seconds 10]
+  .venv/bin/python tests/bench/viewport.py [--edits 1000] [--seconds 10] [--device CUDA]
 
 Says how long an update took Blender's thread, how much memory grew, and whether the picture is that of a fresh view.
 """
@@ -33,10 +33,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--edits", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--device", choices=["CPU", "CUDA"], default="CPU")
     asked = parser.parse_args()
     addon.register()
     bpy.ops.wm.read_factory_settings(use_empty=True)
     room_with_a_cube(bpy.context.scene)
+    setattr(bpy.context.scene.luch, "device", asked.device)
     window, view = Window(), Viewport()
     shown(view, window)
     before, spent = resident_mib(), []
@@ -54,7 +56,7 @@ def main() -> int:
     assert view.preview.wait(WAIT_S) and view.preview.picture is not None, view.text
     right = np.array_equal(view.preview.picture.pixels, shown(Viewport(), window))
     print(
-        f"{asked.edits} edits in {took:.1f} s; an update takes {1e3 * np.median(spent):.1f} ms, at most"
+        f"{view.preview.stats['device']}: {asked.edits} edits in {took:.1f} s; an update takes {1e3 * np.median(spent):.1f} ms, at most"
         f" {1e3 * max(spent):.1f}; {resident_mib() - before:.1f} MiB more; the last state"
         f" {'is shown' if right else 'IS NOT SHOWN'}"
     )
