@@ -22,6 +22,7 @@ def small(scene: Scene, width: int) -> Scene:
     return scene
 
 
+@pytest.mark.promise(4)
 def test_a_batch_that_takes_long_ends_where_it_is_and_leaves_no_trace() -> None:
     renderer = core.render.Renderer(small(veils(count=100), 16))
     renderer.prepare()
@@ -37,6 +38,7 @@ def test_a_batch_that_takes_long_ends_where_it_is_and_leaves_no_trace() -> None:
     assert renderer.stats()["paths"] == 0
 
 
+@pytest.mark.promise(4)
 def test_what_a_cancelled_render_has_drawn_is_what_it_would_have_drawn() -> None:
     scene = small(veils(count=30), 64)
     whole, cut = core.render.Renderer(scene), core.render.Renderer(scene)
@@ -56,6 +58,7 @@ def test_what_a_cancelled_render_has_drawn_is_what_it_would_have_drawn() -> None
     assert np.array_equal(found[drawn], expected[drawn]) and not found[~drawn].any()
 
 
+@pytest.mark.promise(4)
 @pytest.mark.parametrize(("seconds_a_pixel", "looked"), [(1e-9, True), (1e-2, False)])
 def test_who_cancels_does_not_wait_for_an_estimate_that_takes_long(
     monkeypatch: pytest.MonkeyPatch, seconds_a_pixel: float, looked: bool
