@@ -51,8 +51,12 @@ TABLE = (
 
 NOISY = RenderPass("Noisy Image", "RGBA", "COLOR")  # Combined before denoising, where that is on, as Cycles has it
 
-# Passes of Cycles that guide its own sampling of volumes: nothing that Luch has.
+# Passes of Cycles that guide its own sampling of volumes or its denoising, and what a shadow catcher catches.
 NOT_RENDERED = {
+    "Shadow Catcher": "cycles.use_pass_shadow_catcher",
+    "Denoising Specular Albedo": "cycles.denoising_store_passes",
+    "Denoising Roughness": "cycles.denoising_store_passes",
+    "Denoising Depth": "cycles.denoising_store_passes",
     "Volume Scatter": "cycles.use_pass_volume_scatter",
     "Volume Transmit": "cycles.use_pass_volume_transmit",
     "Volume Majorant": "cycles.use_pass_volume_majorant",

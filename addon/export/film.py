@@ -22,7 +22,7 @@ def export_film(context: ExportContext, size: tuple[int, int] | None) -> Film:
     for name in unnamed:
         context.warn(f'View layer "{view_layer.name}": AOV "{name}" has the name of another pass. Rename it.')
     for name in passes.missing_passes(view_layer):
-        context.warn(f'View layer "{view_layer.name}": pass "{name}" is Cycles\' own; Luch does not render it.')
+        context.warn(f'View layer "{view_layer.name}" asks for the pass "{name}", which Luch does not render.')
     scale = render.resolution_percentage / 100.0
     width, height = size or (int(render.resolution_x * scale), int(render.resolution_y * scale))
     film = replace(

@@ -221,10 +221,18 @@ def test_a_volume_that_changes_from_place_to_place_is_named_and_left_out(scene: 
     assert 'Material "Volume": node "Volume Scatter" changes from place to place' in told
 
 
-def test_passes_about_cycles_own_sampling_are_named(scene: bpy.types.Scene) -> None:
+@pytest.mark.parametrize(
+    ("switch", "name"),
+    [
+        ("use_pass_volume_majorant", "Volume Majorant"),
+        ("use_pass_shadow_catcher", "Shadow Catcher"),
+        ("denoising_store_passes", "Denoising Depth"),
+    ],
+)
+def test_passes_of_cycles_that_are_not_rendered_are_named(scene: bpy.types.Scene, switch: str, name: str) -> None:
     stage(scene)
-    scene.view_layers[0].cycles.use_pass_volume_majorant = True
-    assert any('pass "Volume Majorant"' in warning for warning in exported().warnings)
+    setattr(scene.view_layers[0].cycles, switch, True)
+    assert any(f'the pass "{name}"' in warning for warning in exported().warnings)
 
 
 def test_numbers_that_nodes_compute_make_an_even_volume(scene: bpy.types.Scene) -> None:
