@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
+from support import checkout
 
 SCENE = """
 import bpy, addon
@@ -29,11 +27,10 @@ def render(**options):
 
 def blender(script: str, *arguments: str, before: str = "", **environment: str) -> str:
     """What a process with bpy and the add-on prints; it must end well."""
-    paths = [str(ROOT), str(ROOT / "native"), *filter(None, [os.environ.get("PYTHONPATH")])]
     result = subprocess.run(
         [sys.executable, "-c", before + SCENE + script, *arguments],
         capture_output=True, text=True, errors="replace", timeout=120, check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), **environment},
+        env={**checkout.environment(), **environment},
     )  # fmt: skip
     assert result.returncode == 0, result.stdout[-2000:] + result.stderr[-4000:]
     return result.stdout

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from economy_page import commit
+from support.checkout import commit
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "out" / "bench" / "accuracy.json"

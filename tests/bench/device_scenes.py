@@ -81,10 +81,10 @@ def luch(options: argparse.Namespace) -> int:
 
     import numpy as np
     from device_render import StageTimes
-    from economy_page import commit
     from luch.cuda import device
     from luch.render import render
     from luch.scenefile import read_scene
+    from support.checkout import commit
 
     seconds, kept = {}, {}
     for name in options.scene:

@@ -36,6 +36,7 @@ from luch.effects.removal import REMOVALS  # noqa: E402
 from luch.render import Result, render  # noqa: E402
 from luch.scene import Scene  # noqa: E402
 from luch.scenefile import read_scene  # noqa: E402
+from support.checkout import commit  # noqa: E402
 
 OUT = ROOT / "out" / "bench"
 BYTES = ("film_pixel_bytes", "scene_bytes", "structure_bytes", "device_scene_bytes", "device_film_and_paths_bytes")
@@ -104,7 +105,7 @@ def keep(device: str, scene: str, kind: str, name: str, row: dict[str, Any]) -> 
     """Puts a row into the device's record, in place of the last of its name."""
     file = economy_page.record_of(device)
     record = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-    where = {"date": datetime.date.today().isoformat(), "commit": economy_page.commit()}
+    where = {"date": datetime.date.today().isoformat(), "commit": commit()}
     record.setdefault(scene, {}).setdefault(kind, {})[name] = row | where
     file.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 

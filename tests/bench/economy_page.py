@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +20,6 @@ TITLES = {"idle": "**{}: what is idle, simulated all the same.** Time over that 
 def record_of(device: str) -> Path:
     """Where a device's rows are kept."""
     return ROOT / "tests" / "bench" / "records" / f"economy-{device.lower()}.json"
-
-
-def commit() -> str:
-    """Of the checkout; of a copy without history what stands in its file COMMIT, or nothing."""
-    told = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
-                          check=False).stdout.strip()  # fmt: skip
-    beside = ROOT / "COMMIT"
-    return told or (beside.read_text(encoding="utf-8").strip() if beside.exists() else "")
 
 
 def write() -> None:

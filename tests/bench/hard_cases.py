@@ -37,6 +37,7 @@ from luch.accel import KINDS, PRECISIONS, Accel  # noqa: E402
 from luch.render import render  # noqa: E402
 from luch.scene import Camera, Mesh  # noqa: E402
 from support import accel_meshes, closed_meshes  # noqa: E402
+from support.checkout import commit  # noqa: E402
 from support.endings import LATE_STAGES, STAGES, break_stages, cancel, interrupt, veils  # noqa: E402
 from support.hard_furnace import closed_glass_energy, closure_energy, plane_energy  # noqa: E402
 from support.hard_geometry import edge_energy, far_plane, leak, room_scene, stack, sun  # noqa: E402
@@ -290,9 +291,7 @@ def machine() -> str:
 
 def keep(target: Path, o: Options, found: list[Figure], race: list[dict[str, Any]]) -> None:
     """Puts what was measured into the record, each row in place of the one that it measures anew."""
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
-                            check=False).stdout.strip()  # fmt: skip
-    made = {"date": datetime.date.today().isoformat(), "commit": commit, "machine": machine(), "rays": o.rays}
+    made = {"date": datetime.date.today().isoformat(), "commit": commit(), "machine": machine(), "rays": o.rays}
     record = json.loads(target.read_text(encoding="utf-8")) if target.exists() else {}
     rows = {"figures": [asdict(figure) for figure in found], "precisions": race}
     for part, keys in (("figures", ("quantity",)), ("precisions", ("kind", "precision"))):

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -24,6 +23,7 @@ sys.path[:0] = [str(ROOT / "native"), str(ROOT / "tests")]
 
 from luch.accel import KINDS, Accel  # noqa: E402
 from support import closed_meshes  # noqa: E402
+from support.checkout import commit  # noqa: E402
 
 
 def run(kind: str, device: str, count: int) -> Iterator[dict[str, Any]]:
@@ -41,11 +41,9 @@ def run(kind: str, device: str, count: int) -> Iterator[dict[str, Any]]:
 
 def keep(row: dict[str, Any], target: Path) -> None:
     """Puts a row into the record, with its date and commit."""
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True,
-                            check=False).stdout.strip()  # fmt: skip
     rows = json.loads(target.read_text(encoding="utf-8"))["rows"] if target.exists() else []
     place = {(old["kind"], old["mesh"]): k for k, old in enumerate(rows)}.get((row["kind"], row["mesh"]), len(rows))
-    rows[place : place + 1] = [row | {"date": datetime.date.today().isoformat(), "commit": commit}]
+    rows[place : place + 1] = [row | {"date": datetime.date.today().isoformat(), "commit": commit()}]
     target.parent.mkdir(exist_ok=True)
     target.write_text(json.dumps({"rows": rows}, indent=1) + "\n", encoding="utf-8")
 

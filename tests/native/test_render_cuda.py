@@ -272,7 +272,7 @@ def test_kernels_of_any_two_effects_draw_what_general_ones_do(place: str, effect
 @pytest.mark.parametrize("sampler", ["LATTICE", pytest.param("INDEPENDENT", marks=pytest.mark.cuda)])
 def test_kernels_draw_the_numbers_of_the_family_that_was_asked_for(place: str, sampler: str) -> None:
     if place == FIBERS and sampler == "INDEPENDENT":
-        pytest.skip("on a GPU alone")
+        pytest.skip("on a GPU alone: LATTICE shows the way of a family, and a second would be compiled for fibers")
     scene = replace(plain(), settings=replace(plain().settings, sampler=sampler))
     cpu, _, ours, stats = both(scene)
     check_equal("Combined", cpu["Combined"], ours["Combined"], place)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 from luch.render import Progress, render
 from luch.scene import Camera, Film, Material, Scene, Settings
 from luch.shader import ProgramBuilder
 
+from support.checkout import environment
 from support.effects import closure, program
 from support.media import at, box, bulb, placed
-
-ROOT = Path(__file__).resolve().parents[2]
 
 # Where a render can fail before its result is delivered, and after.
 STAGES = (
@@ -68,12 +65,6 @@ for stage in json.loads(sys.argv[1]):
 again = bpy.ops.render.render()
 print("told:", json.dumps([told, "FINISHED" in again]), flush=True)
 """
-
-
-def environment() -> dict[str, str]:
-    """For a process with bpy and the add-on."""
-    paths = [str(ROOT), str(ROOT / "native"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def interrupt(after_s: float = 1.5) -> tuple[float, str, bool]:
