@@ -91,12 +91,13 @@ namespace {
 using Flags = py::array_t<u8, py::array::c_style | py::array::forcecast>;
 
 // Guesses at the truth for radius 1..radius, each float32 (H, W, 3).
-py::list guess_truth(const Floats& mean, const Floats& grey, const Floats& noise, const Flags& known,
-                     const Flags& beside, int radius, float edge_gap) {
+py::list guess_truth(const Floats& mean, const Floats& grey, const Floats& held, const Floats& noise,
+                     const Flags& known, const Flags& beside, int radius, float edge_gap) {
     const py::ssize_t height = grey.shape(0), width = grey.shape(1);
-    for (const py::array& array : {py::array(grey), py::array(noise), py::array(known), py::array(beside)})
+    for (const py::array& array :
+         {py::array(grey), py::array(held), py::array(noise), py::array(known), py::array(beside)})
         if (array.ndim() != 2 || array.shape(0) != height || array.shape(1) != width)
-            throw py::value_error("grey, noise, known and beside must have one shape (H, W)");
+            throw py::value_error("grey, held, noise, known and beside must have one shape (H, W)");
     if (mean.ndim() != 3 || mean.shape(0) != height || mean.shape(1) != width || mean.shape(2) != 3)
         throw py::value_error("mean must have shape (H, W, 3)");
     py::list guesses;
@@ -106,7 +107,8 @@ py::list guess_truth(const Floats& mean, const Floats& grey, const Floats& noise
         out.push_back(guess.mutable_data());
         guesses.append(guess);
     }
-    const cpu::NoisyPicture picture{height, width, mean.data(), grey.data(), noise.data(), known.data(), beside.data()};
+    const cpu::NoisyPicture picture{height,      width,        mean.data(),  grey.data(),
+                                    held.data(), noise.data(), known.data(), beside.data()};
     py::gil_scoped_release release;
     cpu::ThreadPool pool(height * width < 65536 ? 1 : 0);
     cpu::guess_truth(picture, radius, edge_gap, out.data(), pool);
@@ -117,8 +119,8 @@ py::list guess_truth(const Floats& mean, const Floats& grey, const Floats& noise
 
 void bind_film(py::module_& m) {
     auto film = m.def_submodule("film", "Sums of samples, and render passes read from them.");
-    film.def("guess_truth", &guess_truth, py::arg("mean"), py::arg("grey"), py::arg("noise"), py::arg("known"),
-             py::arg("beside"), py::arg("radius"), py::arg("edge_gap"));
+    film.def("guess_truth", &guess_truth, py::arg("mean"), py::arg("grey"), py::arg("held"), py::arg("noise"),
+             py::arg("known"), py::arg("beside"), py::arg("radius"), py::arg("edge_gap"));
     py::class_<cpu::Film>(film, "Film")
         .def(py::init([](const py::handle& settings, const py::handle& origin, bool marks) {
                  cpu::FilmSpec spec = read_film(settings, origin);

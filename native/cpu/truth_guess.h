@@ -1,4 +1,5 @@
-// What pixels may be, told by neighbours that differ from them by no more than noise: luch/accuracy.py says why.
+// What pixels may be, told by neighbours that differ from them by no more than noise, and by what a pixel's samples
+// agree upon: luch/accuracy.py says why.
 #pragma once
 #include "cpu/thread_pool.h"
 #include "luch/math/vec.h"
@@ -10,6 +11,7 @@ struct NoisyPicture {
     i64 height, width;
     const float* mean;   // 3 a pixel
     const float* grey;   // of mean
+    const float* held;   // what both parts of the samples bear out of grey
     const float* noise;  // variance of grey that a gap to a neighbour may have
     const u8* known;     // 0: says nothing of its neighbours
     const u8* beside;    // touches a surely brighter one

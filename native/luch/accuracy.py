@@ -32,8 +32,10 @@ NEAR = 1  # pixels; 3 x 3 neighbours tell how unevenly the error is spread
 GUIDE_RADIUS = 2  # pixels; how far neighbours may lie that say how bright the truth may be
 SURE = 0.25  # of a neighbour's brightness: deviations below tell that it is there
 EDGE_GAP = 4.0  # times as bright as its surroundings: a pixel that may lie on a bright neighbour's edge
-GAP_VARIANCES = 4.0  # a gap of two standard deviations to the neighbours may still be noise
+GAP_VARIANCES = 9.0  # a gap of three standard deviations to a neighbour may still be noise
 TILE = 16  # pixels; edge of the tiles whose sums of deviations are taken as independent
+# Of the logarithm of a relMSE, one standard deviation: what truths that were guessed are off by in most pictures.
+GUESS_SPREAD = 0.06
 FIREFLIES = 0.001  # share of the pixels that are asked for their share of the error
 
 
@@ -105,24 +107,38 @@ def _measured(deviation: F32) -> tuple[F64, F64, F64]:
     )
 
 
-def _truth_guesses(mean: F32, d: F64, known: F64) -> list[F32]:
+def _borne_out(grey: F32, d: F64, share: float) -> F32:
+    """What both parts of a pixel's samples bear out of its brightness: their harmonic mean.
+
+    Parts that agree have all of it. Of a firefly, which one part alone has found, next to nothing: a harmonic mean is
+    at most the smaller part over the larger part's share of the samples.
+    """
+    other = grey + d * (1.0 - 2.0 * share) / np.sqrt(share * (1.0 - share))  # the two, weighted the other way round
+    lost = np.divide(d * d, other, out=np.full_like(other, np.inf), where=other > 0.0)
+    return np.asarray(np.clip(grey - lost, 0.0, np.maximum(grey, 0.0)), dtype=np.float32)
+
+
+def _truth_guesses(mean: F32, d: F64, known: F64, share: float) -> list[F32]:
     """What each pixel is divided by: the truth is not known, and a pixel's own noise must not hide its error.
 
     The mean of those neighbours whose brightness differs by no more than noise explains (Lee's sigma filter, 1983),
-    without the pixel itself: an edge keeps its two sides, a firefly is held against what lies around it. Noise: the
-    pixel's own deviation, or that of its neighbours in proportion to brightness. One guess for each radius of
-    1..GUIDE_RADIUS.
+    and, as one more of them, of what the pixel's own samples agree upon: an edge keeps its two sides, a highlight
+    counts by half, a firefly is held against what lies around it. Noise is what neighbours have in proportion to their
+    brightness; by a firefly's own noise any neighbour would do. For the same reason a pixel is compared by the mean of
+    its brightness and what is borne out of it. One guess for each radius of GUIDE_RADIUS..1; the nearest neighbours
+    were off by half as much as those two pixels away (twelve scenes).
     """
     grey = (known[..., 0] * mean.mean(axis=2)).astype(np.float32)
-    noise = (d.mean(axis=2) ** 2).astype(np.float32)
+    deviation = d.mean(axis=2)
     lit = box_sum((grey * grey).astype(np.float64))
-    relative = np.divide(box_sum(noise.astype(np.float64)), lit, out=np.zeros_like(lit), where=lit > 0.0)
-    noise = GAP_VARIANCES * np.maximum(noise, relative.astype(np.float32) * grey * grey)
+    relative = np.divide(box_sum(deviation**2), lit, out=np.zeros_like(lit), where=lit > 0.0)
+    noise = (GAP_VARIANCES * relative).astype(np.float32) * grey * grey
     from luch._native import core  # not needed by those who only read numbers
 
     beside = _beside_bright(grey, np.abs(d).mean(axis=2).astype(np.float32))
-    guesses = core.film.guess_truth(mean, grey, noise, known[..., 0] > 0.0, beside, GUIDE_RADIUS, EDGE_GAP)
-    return list(guesses)
+    held = _borne_out(grey, deviation, share)
+    guesses = core.film.guess_truth(mean, grey, held, noise, known[..., 0] > 0.0, beside, GUIDE_RADIUS, EDGE_GAP)
+    return list(guesses)[::-1]
 
 
 def _beside_bright(grey: F32, deviation: F32) -> NDArray[np.bool_]:
@@ -146,17 +162,17 @@ def _ring(radius: int) -> list[tuple[int, int]]:
     return [(dy, dx) for dy in steps for dx in steps if max(abs(dy), abs(dx)) == radius]
 
 
-def relative_deviations(mean: F32, deviation: F32) -> list[F64]:
+def relative_deviations(mean: F32, deviation: F32, share: float) -> list[F64]:
     """Deviations over what the truth may be, (H, W, 3); 0 where nothing is known. Mean square: the relMSE.
 
-    One for each guess at the truth; the last is the best.
+    share: of the samples that the first part holds. One for each guess at the truth; the last is the best.
     """
     d, known, _ = _measured(deviation)
     mean = np.where(known > 0.0, mean, np.float32(0.0))
     # Squares of floats stay floats: no colour above 1.
     unit = max(float(np.abs(mean).max()), float(np.finfo(np.float32).tiny))
 
-    guesses = _truth_guesses(mean / np.float32(unit), d / unit, known)
+    guesses = _truth_guesses(mean / np.float32(unit), d / unit, known, share)
     return [d / (np.abs(truth).astype(np.float64) * unit + DARK) for truth in guesses]
 
 
@@ -170,19 +186,21 @@ def _tile_sums(image: F64) -> F64:
     return np.asarray(np.add.reduceat(rows, np.arange(0, image.shape[1], TILE), axis=1))
 
 
-def estimate(mean: F32, deviation: F32) -> Estimate | None:
-    """The error of a picture from Combined and its deviations, float32 (H, W, 3); None while no pixel has both halves.
+def estimate(mean: F32, deviation: F32, share: float = 0.5) -> Estimate | None:
+    """The error of a picture from Combined and its deviations, float32 (H, W, 3); None while no pixel has both parts.
+    share: of the samples that the first part holds, as the film tells it.
 
     The interval is for this picture's own error, not for that of pictures with other seeds: with q a pixel's share,
     error and estimate differ by the mean of products ab, whose variance is at most 4 sum(E[q]^2) / P^2 (all of it
     where the channels vary together). The nearest neighbours stand for E[q], as noise may lie in edges one pixel wide; pooled squares of heavy tails are larger than the
-    square of the expectation, and widen the interval. So does disagreement of the guesses at the truth.
+    square of the expectation, and widen the interval. So do what guesses at the truth are off by, and
+    their disagreement.
     """
     d, known, _ = _measured(deviation)
     pixels = float(known.sum())
     if pixels == 0.0:
         return None
-    *rougher, scaled = relative_deviations(mean, deviation)
+    *rougher, scaled = relative_deviations(mean, deviation, share)
     squares = _square(scaled)
     mse = float(squares.sum()) / pixels
     pooled = np.maximum(box_sum(squares, NEAR), 0.0) / np.maximum(box_sum(known[..., 0], NEAR), 1.0)
@@ -190,7 +208,7 @@ def estimate(mean: F32, deviation: F32) -> Estimate | None:
     factor = 1.0
     if mse > 0.0:
         guess = max(abs(np.log(float(_square(other).sum()) / pixels / mse)) for other in rougher)
-        factor = float(np.exp(0.5 * np.hypot(NORMAL_95 * noise / mse, guess)))
+        factor = float(np.exp(0.5 * np.hypot(NORMAL_95 * np.hypot(noise / mse, GUESS_SPREAD), guess)))
     top = np.sort(squares[known[..., 0] > 0.0])[-max(1, round(FIREFLIES * pixels)) :]
     brightness = float((known * np.where(known > 0.0, mean, 0.0)).sum()) / (3.0 * pixels)
     uncertainty = _uncertainty_of_sum(_tile_sums(d.mean(axis=2))) / pixels

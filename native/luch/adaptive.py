@@ -64,7 +64,7 @@ class Regions:
     def count(self) -> int:
         return len(self.pixels)
 
-    def variances(self, mean: F32, deviation: F32, counts: U32) -> F64:
+    def variances(self, mean: F32, deviation: F32, share: float, counts: U32) -> F64:
         """Relative variance of one sample of a pixel, (regions,); 0 where nothing is known.
 
         mean, deviation: of the core's film, (H, W, 3); counts: samples of each region. A region's is told by its own
@@ -76,7 +76,8 @@ class Regions:
             there = own >= 0
             place = np.where(there, own, 0)
             images = [np.where(there[..., None], image.reshape(-1, 3)[place], np.nan) for image in (mean, deviation)]
-            scaled = accuracy.relative_deviations(images[0].astype(np.float32), images[1].astype(np.float32))[-1]
+            mean_there, deviation_there = (image.astype(np.float32) for image in images)
+            scaled = accuracy.relative_deviations(mean_there, deviation_there, share)[-1]
             squares.reshape(-1)[own[there]] = np.mean(scaled * scaled, axis=2)[there]
         squares[~np.isfinite(squares)] = 0.0
         sums = np.bincount(self.of_pixel.ravel(), squares.ravel(), minlength=self.count)
@@ -152,11 +153,11 @@ class Adaptive:
         self.used = False
         self._most = most
 
-    def decide(self, mean: F32, deviation: F32, samples: int) -> None:
+    def decide(self, mean: F32, deviation: F32, share: float, samples: int) -> None:
         """At a look, with what the film told; samples: on average."""
         if samples < FIRST_DECISION:
             return
-        self.shares = self.regions.shares(self.regions.variances(mean, deviation, self.counts))
+        self.shares = self.regions.shares(self.regions.variances(mean, deviation, share, self.counts))
         self.used = self.used or self.shares.worthwhile
 
     def ends(self, samples: int) -> U32:

@@ -16,10 +16,15 @@ from luch import samplers
 from luch.accuracy import Estimate, overstated, percent
 
 LOWEST_RATE, HIGHEST_RATE = 0.9, 1.8
-POINT_SPREAD = 0.05  # of the logarithm of a relMSE, beside its interval
+POINT_SPREAD = 0.02  # of the logarithm of a relMSE, beside its interval
+LEVEL_SPREAD = 0.1  # the same, where points are to tell one level: their luck is not in their intervals
+MOST_LUCK = 0.5  # of the logarithm of a relMSE: what lies further off the curve is no luck
 MEMORY = 0.5  # weight of a point over that of another with twice as many samples: the rate drifts towards 1
+PLAINLY_OFF = 2.0  # standard deviations between a render's own rate and what was known before
+RATE_FADES = 0.4  # of what the rate has over 1, on the way to four times the samples and beyond
 # Of the rate beyond the points seen: it drifts, and bright paths are found late.
 RATE_DRIFT = 0.08
+LUCK_STEPS = 24  # until a forecast agrees with itself; each leaves less than a third
 TIME_SPREAD = 0.03  # of the logarithm of seconds a sample
 NORMAL_80 = 1.2816  # standard deviations on either side that hold 80 % of a normal distribution
 
@@ -54,16 +59,21 @@ class Curve:
             return known, doubted
         x = np.log([point[0] for point in told])
         y = np.log([point[2].error ** 2 / overstated(point[3], known) for point in told])
-        spread = np.array([2.0 * point[2].spread for point in told])
-        w = MEMORY ** ((x[-1] - x) / np.log(2.0)) / (spread**2 + POINT_SPREAD**2)
+        own = np.array([2.0 * point[2].spread for point in told])
+        w = MEMORY ** ((x[-1] - x) / np.log(2.0)) / (own**2 + POINT_SPREAD**2)
         x, y = x - np.average(x, weights=w), y - np.average(y, weights=w)
         slope, weight = float(np.sum(w * x * y)), float(np.sum(w * x * x))
         # Points that lie off any line more than they claim to are less sure than they claim.
         rest = float(np.sum(w * (y - slope / weight * x) ** 2)) / max(1, len(told) - 2)
         doubt = max(1.0, rest)
-        before = doubted**-2
-        p = (before * known - slope / doubt) / (before + weight / doubt)
-        return float(np.clip(p, LOWEST_RATE, HIGHEST_RATE)), float((before + weight / doubt) ** -0.5)
+        line, certain = -slope / weight, weight / doubt
+        # What was known is of other scenes. A line that contradicts it makes the rate less sure; one that contradicts
+        # it plainly is followed more closely.
+        off = abs(line - known) / float(np.hypot(doubted, certain**-0.5))
+        before = (doubted * max(1.0, (off / PLAINLY_OFF) ** 2)) ** -2
+        p = (before * known + certain * line) / (before + certain)
+        spread = max(1.0, off) * (before + certain) ** -0.5
+        return float(np.clip(p, LOWEST_RATE, HIGHEST_RATE)), float(spread)
 
     def estimates(self) -> list[Estimate]:
         """The points' estimates, with what complementary parts overstate taken out."""
@@ -86,8 +96,23 @@ class Curve:
             return seconds / samples
         return max(0.0, seconds - earlier[-1][1]) / (samples - earlier[-1][0])
 
+    def _level(self, rate: float) -> float:
+        """Logarithm of the relMSE that a render of the last point's samples has on the mean over its luck, as all
+        points tell it; of those long ago the less."""
+        told = [
+            (samples, one) for (samples, *_), one in zip(self.points, self.estimates(), strict=True) if one.error > 0.0
+        ]
+        octaves = np.log2([self.points[-1][0] / samples for samples, _ in told])
+        now = 2.0 * np.log([one.error for _, one in told]) - rate * np.log(2.0) * octaves
+        weights = MEMORY**octaves / np.array([(2.0 * one.spread) ** 2 + LEVEL_SPREAD**2 for _, one in told])
+        return float(np.average(now, weights=weights))
+
     def forecast(self, error: float) -> Forecast:
-        """What it takes until the error is that small: 0 if it is; infinite while nothing is known."""
+        """What it takes until the error is that small: 0 if it is; infinite while nothing is known.
+
+        It starts from the error at hand. But the luck of the samples at hand, good or bad, is one part in k of what k
+        times as many will have: the forecast goes over to what all points say.
+        """
         found = self.last
         if found is None or not error > 0.0:
             return Forecast(np.inf, np.inf, np.inf, np.inf)
@@ -95,7 +120,12 @@ class Curve:
         if found.error <= error:
             return Forecast(0.0, 0.0, 0.0, 0.0)
         rate, spread = self.rate()
-        growth = 2.0 * float(np.log(found.error / error)) / rate  # logarithm of samples needed over samples taken
+        ahead = 1.0 + (rate - 1.0) * (1.0 - RATE_FADES) if rate > 1.0 else rate
+        now, aim = 2.0 * float(np.log(found.error)), 2.0 * float(np.log(error))
+        luck = float(np.clip(now - self._level(rate), -MOST_LUCK, MOST_LUCK))
+        growth = (now - aim) / ahead  # logarithm of samples needed over samples taken
+        for _ in range(LUCK_STEPS):
+            growth = (now - luck * (1.0 - float(np.exp(-growth))) - aim) / ahead
         doubt = float(
             np.sqrt(
                 (2.0 / rate * found.spread) ** 2

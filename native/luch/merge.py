@@ -63,7 +63,7 @@ class Sums:
     def estimate(self) -> accuracy.Estimate | None:
         """The error of the picture."""
         mean, deviation, share = self.native().deviations()
-        found = accuracy.estimate(mean, deviation)
+        found = accuracy.estimate(mean, deviation, share)
         return found and curve.corrected(found, 0.0 if self.independent else share, *self.rate)
 
     def error_passes(self, names: Sequence[str]) -> dict[str, F32]:

@@ -7,8 +7,8 @@ For each scene, small, against a picture converged by Luch itself (its noise is 
       of the pixels that Reliability flags; of those that are off by twice their interval, how many it flags
   A4  renders that end at an error asked for: true over asked, median, part within 0.7..1.1; samples taken
   A5  their brightness over the reference's, in per cent, with its standard error
-  A6  the time to the error of four times the samples, from 64 on: median of |log(foretold / taken)|, part within 20 %,
-      part whose 80 % interval holds
+  A6  the time to the error of four times the samples, from 64 and from 256, and of sixteen times, from 64: median of
+      |log(foretold / taken)|, part within 20 %, part whose 80 % interval holds
   A7  seconds over a time limit
   A8  seconds with the estimate over seconds without, interleaved, median
   adaptive  as A4 and A5, with samples where the error is
@@ -33,25 +33,22 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "bench"), str(ROOT), str(ROOT / "native"), str(ROOT / "tests")]
 
-import bpy  # noqa: E402
 import numpy as np  # noqa: E402
-from accuracy_page import FILE, Kept, Row, report, table  # noqa: E402
+from accuracy_page import FILE, Kept, Row, report, table, write_page_from  # noqa: E402
 from luch import accuracy, image, pixel_error, samplers  # noqa: E402
 from luch._native import core  # noqa: E402
 from luch.cuda.several import renderer_for  # noqa: E402
 from luch.curve import Curve, correction  # noqa: E402
 from luch.render import render  # noqa: E402
 from luch.scene import Scene  # noqa: E402
+from luch.scenefile import read_scene, write_scene  # noqa: E402
 from luch.stopping import CUSTOM, looks_after  # noqa: E402
-from scenes import SCENES, scenes_folder  # noqa: E402
 from support.races import Truth, in_turns  # noqa: E402
 
-import addon  # noqa: E402
-from addon.engine import capture_scene  # noqa: E402
-from buildtools.inside import session  # noqa: E402
-
 OUT = ROOT / "out" / "bench"
-MOST = 256  # samples of A2 and A6
+MOST = 1024  # samples of A6
+SEEN = 32, 256  # samples of the looks that A2 asks for
+AHEAD = (64, 4), (256, 4), (64, 16)  # forecasts that A6 asks for: samples, and how many times as many
 PIXELS_AT = 64  # samples of A3
 REFERENCE_SEEDS = 991, 992
 OPTIONS = "size", "seeds", "pairs", "reference", "device"  # that rows of one table have in common
@@ -61,7 +58,15 @@ CYCLES_MOST = 2048  # samples
 
 
 def opened(file: Path, size: int) -> Scene:
-    """The file's own camera and frame, small."""
+    """The file's own camera and frame, small; of a .luch file as it was captured."""
+    if file.suffix == ".luch":
+        return read_scene(file)
+    import bpy
+
+    import addon
+    from addon.engine import capture_scene
+    from buildtools.inside import session
+
     try:
         scene = session.open_file(str(file), "LUCH")
         render_settings = scene.render
@@ -86,19 +91,23 @@ def with_settings(scene: Scene, **settings: Any) -> Scene:
 
 def shot(scene: Scene, **settings: Any) -> Any:
     """A render on the device that was asked for, and on no other."""
-    result = render(with_settings(scene, **settings))
-    if not result.stats["device"].startswith(scene.settings.device):
+    asked = with_settings(scene, **settings)
+    result = render(asked)
+    if not result.stats["device"].startswith(asked.settings.device):
         raise RuntimeError("; ".join(result.stats["warnings"]))
     return result
 
 
-def converged(scene: Scene, name: str, samples: int) -> Truth:
-    """Two halves, kept in out/bench/accuracy for the next run; what they differ by is what the picture errs by."""
+def converged(scene: Scene, name: str, samples: int, device: str) -> Truth:
+    """Two halves, kept in out/bench/accuracy for the next run; what they differ by is what the picture errs by.
+
+    device: what renders them; the pictures are the same.
+    """
     film = scene.film
     file = OUT / "accuracy" / f"{name}-{film.width}x{film.height}-{samples}-halves.npy"
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
-        plain = with_settings(scene, samples=samples // 2, sampler=samplers.DEFAULT)
+        plain = with_settings(scene, samples=samples // 2, sampler=samplers.DEFAULT, device=device)
         halves = [shot(plain, seed=seed).passes["Combined"] for seed in REFERENCE_SEEDS]
         np.save(file, np.stack(halves)[..., :3].astype(np.float64))
     one, other = np.load(file)
@@ -142,14 +151,14 @@ def look_at(scene: Scene, truth: Truth, seed: int, row: Row, pixels: Pixels) -> 
     renderer = renderer_for(settled) if scene.settings.device == "CUDA" else core.render.Renderer(settled)
     renderer.prepare()
     curve, done, spent, seen = Curve(scene.settings.sampler), 0, 0.0, []
-    forecasts: dict[int, tuple[Curve, float]] = {}
+    kept: dict[int, tuple[Curve, float]] = {}
     while done < MOST:
         following = min(looks_after(done), MOST)
         began = time.perf_counter()
         renderer.render(done, following - done)
         spent, done = spent + time.perf_counter() - began, following
         mean, deviation, share = renderer.deviations()
-        found = accuracy.estimate(mean, deviation)
+        found = accuracy.estimate(mean, deviation, share)
         assert found is not None
         curve.add(done, spent, found, share)
         error, told = truth.error(mean, done), curve.last
@@ -157,18 +166,21 @@ def look_at(scene: Scene, truth: Truth, seed: int, row: Row, pixels: Pixels) -> 
         seen.append((done, error))
         if done == PIXELS_AT:
             pixels.add(mean, deviation, (share, curve.rate()[0]), error)
-        if done >= 32:
+        if SEEN[0] <= done <= SEEN[1]:
             row.a2.append((told.error / error) ** 2)
             row.a2_covered.append(told.error_low <= error <= told.error_high)
-        if done == MOST // 4:
-            kept = Curve(scene.settings.sampler)
-            kept.points = list(curve.points)
-            forecasts[done * 4] = (kept, spent)
-        if done in forecasts:
-            early, before = forecasts[done]
-            ahead = early.forecast(error)
-            row.a6.append(float(np.log((before + ahead.seconds) / spent)))
-            row.a6_covered.append(ahead.seconds_low <= spent - before <= ahead.seconds_high)
+        for first, times in AHEAD:
+            if done == first:
+                kept[done] = Curve(scene.settings.sampler), spent
+                kept[done][0].points = list(curve.points)
+            if done == first * times:
+                early, before = kept[first]
+                ahead = early.forecast(error)
+                told_and_held = row.a6 if times == 4 else row.a6_far
+                told_and_held.append((
+                    float(np.log((before + ahead.seconds) / spent)),
+                    ahead.seconds_low <= spent - before <= ahead.seconds_high,
+                ))  # fmt: skip
     return seen
 
 
@@ -209,7 +221,7 @@ def cost(scene: Scene, pairs: int) -> list[float]:
 
 def race(scene: Scene, name: str, sampler: str, options: argparse.Namespace) -> Row:
     """Everything about one scene and sampler."""
-    truth = converged(scene, name, options.reference)
+    truth = converged(scene, name, options.reference, options.reference_device or options.device)
     row = Row(name, sampler, scene.film.width, scene.film.height)
     pixels = Pixels(truth, row)
     seen = [look_at(scene, truth, seed, row, pixels) for seed in range(options.seeds)]
@@ -226,6 +238,8 @@ def race(scene: Scene, name: str, sampler: str, options: argparse.Namespace) -> 
 
 def cycles_picture(file: Path, row: Row, samples: int, seed: int, threshold: float) -> tuple[np.ndarray, float]:
     """Cycles' own picture of the file, nothing taken from its light: Combined, seconds."""
+    from buildtools.inside import session
+
     scene = session.open_file(str(file), "CYCLES")
     session.choose_size(scene, row.width, row.height)
     session.choose_samples(scene, samples, seed=seed)
@@ -247,7 +261,7 @@ def cycles_thresholds(file: Path, scene: Scene, row: Row, options: argparse.Name
     kept = OUT / "accuracy" / f"{row.scene}-{row.width}x{row.height}-cycles-{options.reference}.npy"
     if not kept.exists():
         np.save(kept, cycles_picture(file, row, options.reference, REFERENCE_SEEDS[0], 0.0)[0])
-    truth = converged(scene, row.scene, options.reference)
+    truth = converged(scene, row.scene, options.reference, options.reference_device or options.device)
     own = Truth(np.load(kept), options.reference)
     told = []
     for threshold in THRESHOLDS:
@@ -268,35 +282,66 @@ def cycles_thresholds(file: Path, scene: Scene, row: Row, options: argparse.Name
 def main() -> int:
     parser = argparse.ArgumentParser(prog="build.py bench accuracy", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
-    parser.add_argument("--scene", nargs="+", default=SCENES, metavar="NAME", help=f"default: {' '.join(SCENES)}")
+    parser.add_argument("--scene", nargs="+", metavar="NAME", help="default: those of build.py bench scenes")
     parser.add_argument("--size", type=int, default=160, help="long side, pixels")
     parser.add_argument("--seeds", type=int, default=8, help="renders of each kind")
     parser.add_argument("--pairs", type=int, default=5, help="pairs of renders that A8 compares")
     parser.add_argument("--reference", type=int, default=8192, help="samples of the converged picture")
     parser.add_argument("--cycles", action="store_true", help="Cycles' noise threshold beside, on the same scenes")
+    parser.add_argument("--only-cycles", action="store_true", help="no rows of Luch's own")
+    parser.add_argument(
+        "--capture", type=Path, metavar="FOLDER", help="write the scenes, small, as .luch files, and end"
+    )
+    parser.add_argument("--captured", type=Path, metavar="FOLDER", help="read them: needs no Blender")
+    parser.add_argument("--from", dest="sources", nargs="+", type=Path, metavar="JSON",
+                        help="measure nothing: make the page of what several calls kept")  # fmt: skip
     parser.add_argument("--sampler", nargs="+", type=str.upper, default=[samplers.DEFAULT], choices=samplers.NAMES)
     parser.add_argument("--device", type=str.upper, default="CPU", choices=("CPU", "CUDA"), help="what renders")
+    parser.add_argument("--reference-device", type=str.upper, choices=("CPU", "CUDA"), help="default: --device")
     parser.add_argument("--append", action="store_true", help="keep what out/bench/accuracy.json has of this code")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no row after so long")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/accuracy.md")
     options = parser.parse_args()
-    folder = scenes_folder()
-    if folder is None:
+    if options.sources:
+        write_page_from(options.sources)
+        return 0
+    files = scene_files(options)
+    if not files:
         print("no scenes: no shared/scenes beside the checkout and LUCH_SCENES is not set; nothing was measured")
         return 2
+    if options.capture:
+        options.capture.mkdir(parents=True, exist_ok=True)
+        for file in files:
+            write_scene(opened(file, options.size), options.capture / f"{file.stem}.luch")
+        return 0
     kept = Kept({name: getattr(options, name) for name in OPTIONS}, options.append)
-    failed = measure(folder, options, kept)
+    failed = measure(files, options, kept)
     print(f"{len(kept.rows)} rows in {FILE}" + (f"; failed: {', '.join(failed)}" if failed else ""))
     if kept.rows:
         print(report(kept.rows, kept.what))
     return 1 if failed else 0
 
 
-def measure(folder: Path, options: argparse.Namespace, kept: Kept) -> list[str]:
+def scene_files(options: argparse.Namespace) -> list[Path]:
+    """Of the scenes that were asked for; none where there are none."""
+    if options.captured:
+        return (
+            [options.captured / f"{name}.luch" for name in options.scene]
+            if options.scene
+            else sorted(options.captured.glob("*.luch"))
+        )
+    from scenes import SCENES, scenes_folder
+
+    folder = scenes_folder()
+    return [] if folder is None else [folder / f"{name}.blend" for name in options.scene or SCENES]
+
+
+def measure(files: list[Path], options: argparse.Namespace, kept: Kept) -> list[str]:
     """The rows that are missing; the names of those that could not be measured."""
     failed, ends = [], time.monotonic() + options.seconds
-    for name in options.scene:
-        for sampler in options.sampler:
+    for file in files:
+        name = file.stem
+        for sampler in options.sampler[:1] if options.only_cycles else options.sampler:
             if kept.has(name, sampler):
                 continue
             if time.monotonic() > ends:
@@ -304,7 +349,7 @@ def measure(folder: Path, options: argparse.Namespace, kept: Kept) -> list[str]:
                 return failed
             print(f"{name}, {sampler} ...", flush=True)
             try:
-                kept.add(row_of(folder / f"{name}.blend", sampler, options, not kept.has_cycles(name)))
+                kept.add(row_of(file, sampler, options, not kept.has_cycles(name)))
             except (RuntimeError, OSError, ValueError) as error:
                 failed.append(f"{name}, {sampler}")
                 print(f"{failed[-1]}: {error}", flush=True)
@@ -319,8 +364,13 @@ def row_of(file: Path, sampler: str, options: argparse.Namespace, first: bool) -
     """first: of this scene; Cycles has one sampler."""
     scene = opened(file, options.size)
     scene.settings.device, scene.settings.sampler = options.device, sampler
-    row = race(scene, file.stem, sampler, options)
-    if options.cycles and first:
+    film = scene.film
+    row = (
+        Row(file.stem, sampler, film.width, film.height)
+        if options.only_cycles
+        else race(scene, file.stem, sampler, options)
+    )
+    if (options.cycles or options.only_cycles) and first:
         row.cycles = cycles_thresholds(file, scene, row, options)
     return row
 

@@ -41,7 +41,7 @@ def adaptive_picture(
     done = 32
     while done < samples:
         mean, deviation = grown(sums, regions.pixel_counts(counts), truth)
-        variances = regions.variances(mean, deviation, counts)
+        variances = regions.variances(mean, deviation, 0.5, counts)
         shares = regions.shares(variances) if decide is None else decide(regions, variances)
         done = min(2 * done, samples)
         counts = regions.targets(shares.weights, counts, done, synthetic.MOST)
@@ -79,11 +79,11 @@ def test_what_a_half_found_never_decides_about_itself() -> None:
     rng = np.random.default_rng(1)
     regions, counts = Regions(37, 43), np.full(18, 64, np.uint32)
     mean, deviation = rng.gamma(1.0, 1.0, (2, 37, 43, 3)).astype(np.float32)
-    before = regions.variances(mean, deviation, counts)
+    before = regions.variances(mean, deviation, 0.5, counts)
     white = regions.of_pixel % 2 == 0
     mean[white] *= 3.0
     deviation[white] = 7.0
-    after = regions.variances(mean, deviation, counts)
+    after = regions.variances(mean, deviation, 0.5, counts)
     assert np.array_equal(before[1::2], after[1::2]) and not np.isclose(before[::2], after[::2]).any()
     weights = [regions.shares(told).weights for told in (before, after)]
     whole = [w / w[::2].mean() for w in weights]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,14 +69,16 @@ def scatter(results: list[Result]) -> float:
     return float(np.mean(np.var(pictures, axis=0, ddof=1) * weight))
 
 
+@cache
+def brightness(sampler: str) -> Any:
+    """Of eight seeds."""
+    shots = (shot(everything(sampler=sampler), samples=64, seed=seed, threads=0) for seed in range(8))
+    return np.array([combined(result).mean() for result in shots])
+
+
 @every
 def test_the_picture_is_the_same_but_for_noise(sampler: str) -> None:
-    means, others = (
-        np.array(
-            [combined(shot(everything(sampler=name), samples=64, seed=seed, threads=0)).mean() for seed in range(8)]
-        )
-        for name in (sampler, "INDEPENDENT" if sampler == "SOBOL" else "SOBOL")
-    )
+    means, others = brightness(sampler), brightness("INDEPENDENT" if sampler == "SOBOL" else "SOBOL")
     doubt = np.hypot(means.std(ddof=1), others.std(ddof=1)) / np.sqrt(len(means))
     assert abs(means.mean() - others.mean()) < 4.0 * doubt
     assert doubt < 0.01 * others.mean()
@@ -137,8 +140,9 @@ def test_a_render_to_an_error_ends_with_each_family(sampler: str) -> None:
     assert result.stats["stopped_by"] == "error" and result.stats["error"] < 0.3
     adaptive = shot(everything(sampler=sampler), error_limit=0.3, samples=1 << 12, threads=0, adaptive=True)
     assert adaptive.stats["stopped_by"] == "error"
-    verified = shot(everything(sampler=sampler), samples=64, threads=0, verify=True)
-    assert verified.stats["verified"]["holds"], verified.stats["verified"]
+    verified = [shot(everything(sampler=sampler), samples=64, seed=seed, verify=True).stats for seed in range(3)]
+    told = [stats["verified"] for stats in verified]
+    assert sum(one["holds"] for one in told) >= 2, told  # a verdict at 95 %, of a picture with fireflies
 
 
 def test_the_rate_is_known_before_it_is_seen_where_the_family_fixes_it() -> None:

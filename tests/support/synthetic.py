@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from luch import accuracy
+from luch import accuracy, samplers
 from luch.curve import Curve
 from luch.stopping import Stopping
 from numpy.typing import NDArray
@@ -83,12 +83,12 @@ class Picture:
     def look(self, curve: Curve, samples: int) -> None:
         """A point of the curve; a sample takes 10 ms."""
         mean, deviation, share = self.film(samples)
-        found = accuracy.estimate(mean, deviation)
+        found = accuracy.estimate(mean, deviation, share)
         assert found is not None
         curve.add(samples, 0.01 * samples, found, share)
 
-    def looked_at(self, counts: Sequence[int]) -> Curve:
-        curve = Curve()
+    def looked_at(self, counts: Sequence[int], sampler: str = samplers.DEFAULT) -> Curve:
+        curve = Curve(sampler)
         for samples in counts:
             self.look(curve, samples)
         return curve
