@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from luch.bounds import LEAST_CYLINDER_RADIUS
 from luch.scene import F64, Camera
 
 from .context import ExportContext
@@ -66,7 +67,7 @@ def add_panorama(camera: Camera, data: Any) -> None:
     k0, k1, k2, k3, k4 = (getattr(data, f"fisheye_polynomial_k{power}") for power in range(5))
     camera.fisheye_polynomial = (k0, k1, k2, k3, k4)
     camera.cylinder_angle = (data.central_cylindrical_range_u_min, data.central_cylindrical_range_u_max)
-    radius = max(data.central_cylindrical_radius, 1e-9)
+    radius = max(data.central_cylindrical_radius, LEAST_CYLINDER_RADIUS)
     camera.cylinder_height = (
         data.central_cylindrical_range_v_min / radius,
         data.central_cylindrical_range_v_max / radius,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from luch import core
+from luch.bounds import FLAT_CORNER
 from luch.scene import F32, Attribute, Image, Mesh, Program
 from numpy.typing import NDArray
 
@@ -19,7 +20,6 @@ from .attributes import GENERATED, TANGENT
 
 # Normals before displacement, object space: what bump is added to where a material asks for both.
 UNDISPLACED_NORMAL = "undisplaced normal"
-_FLAT = 1e-4  # corners whose normals differ from the face's by no more are flat
 
 Bools = NDArray[np.bool_]
 
@@ -154,7 +154,7 @@ def _rebuilt(mesh: Mesh, positions: F32, normals: F32, wanted: set[str]) -> Mesh
         result.normals = smooth
         return result
     before = _face_normals(mesh.positions, mesh.triangles)
-    flat: Bools = (np.abs(normals - before[:, None]).max(axis=2) < _FLAT).all(axis=1)
+    flat: Bools = (np.abs(normals - before[:, None]).max(axis=2) < FLAT_CORNER).all(axis=1)
     corners = smooth[mesh.triangles]
     corners[flat] = faces[flat, None]
     result.normals = np.ascontiguousarray(corners.reshape(-1, 3))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from luch.bounds import LEAST_HAIR_SHAPE
 from luch.scene import F32, Attribute, Curves, Mesh
 
 from .attributes import ACTIVE_COLOR
@@ -92,7 +93,7 @@ def _radii(settings: Any, along: Any) -> Any:
     shape = settings.shape
     if shape != 0.0:
         with np.errstate(divide="ignore"):
-            rest = rest ** (1.0 + shape if shape < 0.0 else 1.0 / max(1.0 - shape, 1e-6))
+            rest = rest ** (1.0 + shape if shape < 0.0 else 1.0 / max(1.0 - shape, LEAST_HAIR_SHAPE))
     scale = 0.5 * settings.radius_scale
     radius = scale * (settings.tip_radius + rest * (settings.root_radius - settings.tip_radius))
     if settings.use_close_tip:

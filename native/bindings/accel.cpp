@@ -82,8 +82,9 @@ FloatArray spawn_rays(const FloatArray& corners, const FloatArray& uv, const Flo
     for (py::ssize_t i = 0; i < count; ++i) {
         const Vec3* p = reinterpret_cast<const Vec3*>(corners.data() + 9 * i);
         Vec3 d = *reinterpret_cast<const Vec3*>(directions.data() + 3 * i);
-        TrianglePoint s = traced_point({{p[0], p[1], p[2]}}, uv.data()[2 * i], uv.data()[2 * i + 1]);
-        Vec3 n = normalize_or(cross(p[1] - p[0], p[2] - p[0]), make_vec3(0.0f, 0.0f, 1.0f));
+        Triangle triangle = {{p[0], p[1], p[2]}};
+        TrianglePoint s = traced_point(triangle, uv.data()[2 * i], uv.data()[2 * i + 1]);
+        Vec3 n = normalize_or(area_normal(triangle), make_vec3(0.0f, 0.0f, 1.0f));
         out[i] = {offset_origin(s.p, s.error, n, d), 0.0f, d, INFINITE_DISTANCE};
     }
     return rays;

@@ -1,7 +1,9 @@
-// Phase functions over arrays, for tests.
+// Phase functions over arrays, and the numbers that walks and flights draw, for tests.
 #include "cpu/volume/media.h"
 
 #include "bindings/bind.h"
+#include "luch/integrator/flight_light.h"
+#include "luch/integrator/subsurface_disk.h"
 
 namespace luch::bindings {
 namespace {
@@ -54,12 +56,67 @@ Floats sample_phases(const std::string& kind, float a, float b, const Floats& u)
     return out;
 }
 
+// One of the densities on a line that walks and flights draw from, and its samples. a, b, c:
+//   WALK         cosine of the angle to the last direction; a: anisotropy
+//   GUIDED       cosine of the angle to the normal; a: albedo
+//   PROFILE      distance along a surface; a: length
+//   FLIGHT       distance; a: extinction, b: reach
+//   EQUIANGULAR  distance; a: foot of the light's perpendicular, b: reach, c: distance of the light from the ray
+struct Line {
+    std::string kind;
+    float a, b, c;
+
+    FlightDensity flight() const {
+        FlightDensity d{};
+        d.weights = {1.0f, 0.0f, 0.0f};
+        d.extinction = {a, 1.0f, 1.0f};
+        d.length_inverse = {1.0f / transmitted_length(a, b), 0.0f, 0.0f};
+        return d;
+    }
+    Equiangular equiangular() const {
+        Ray ray{{0.0f, 0.0f, 0.0f}, 0.0f, {0.0f, 0.0f, 1.0f}, b};
+        return make_equiangular(ray, b, {c, 0.0f, a});
+    }
+    float density(float x) const {
+        if (kind == "WALK") return TWO_PI * henyey_greenstein(x, a);
+        if (kind == "GUIDED") return TWO_PI * guided_pdf(guide_of(a), x);
+        if (kind == "PROFILE") return profile(a, x);
+        if (kind == "FLIGHT") return flight_density(flight(), x);
+        if (kind == "EQUIANGULAR") return equiangular_density(equiangular(), x);
+        throw py::value_error("There is no density " + kind);
+    }
+    float sample(float u) const {
+        if (kind == "WALK") return sample_henyey_greenstein(a, u);
+        if (kind == "GUIDED") return sample_guided(guide_of(a), u);
+        if (kind == "PROFILE") return sample_profile(u) * a;
+        if (kind == "FLIGHT") return sample_flight_density(flight(), b, 0.0f, u);
+        if (kind == "EQUIANGULAR") return sample_equiangular(equiangular(), u);
+        throw py::value_error("There is no density " + kind);
+    }
+};
+
+// One function of Line over numbers (N,): float32 (N,).
+template <class F>
+void bind_line(py::module_& m, const char* name, const char* of, F function) {
+    m.def(
+        name,
+        [=](const std::string& kind, float a, float b, float c, const Floats& numbers) {
+            Line line{kind, a, b, c};
+            Floats out(numbers.size());
+            for (py::ssize_t i = 0; i < numbers.size(); ++i) out.mutable_data()[i] = function(line, numbers.data()[i]);
+            return out;
+        },
+        py::arg("kind"), py::arg("a"), py::arg("b"), py::arg("c"), py::arg(of));
+}
+
 }  // namespace
 
 void bind_media(py::module_& m) {
     auto media = m.def_submodule("media", "Phase functions of volumes.");
     media.def("phase_density", &phase_density, py::arg("kind"), py::arg("a"), py::arg("b"), py::arg("after"));
     media.def("sample_phase", &sample_phases, py::arg("kind"), py::arg("a"), py::arg("b"), py::arg("u"));
+    bind_line(media, "line_density", "x", [](const Line& line, float x) { return line.density(x); });
+    bind_line(media, "sample_line", "u", [](const Line& line, float u) { return line.sample(u); });
 }
 
 }  // namespace luch::bindings

@@ -5,10 +5,12 @@
 
 #include "bindings/array_scene.h"
 #include "bindings/bind.h"
+#include "bindings/counts.h"
 #include "bindings/device_image.h"
 #include "bindings/scene_trees.h"
 #include "cpu/accel/scene_trees.h"
 #include "cpu/motion/motion_store.h"
+#include "luch/accel/pass_by.h"
 #include "luch/camera/shutter.h"
 
 namespace luch::bindings {
@@ -32,7 +34,7 @@ FloatArray row_of(const Affine& a) {
 py::tuple place(const Doubles& matrices, float time) {
     std::vector<TransformKey> keys = cpu::make_keys(matrices_of(matrices));
     if (keys.size() < 2) throw py::value_error("the matrices give no keys");
-    Affine to_world = transform_at(keys.data(), {0u, u32(keys.size())}, time);
+    Affine to_world = transform_at(keys.data(), {0u, u32(keys.size()), 0u}, time);
     return py::make_tuple(row_of(to_world), row_of(inverse_of(to_world)));
 }
 
@@ -43,6 +45,18 @@ FloatArray shutter_times(const std::vector<float>& curve, const FloatArray& u) {
     shutter.rolling = -1.0f;
     FloatArray out(u.size());
     for (py::ssize_t i = 0; i < u.size(); ++i) out.mutable_data()[i] = shutter_time(shutter, u.data()[i], 0, 1);
+    return out;
+}
+
+// Of each ray (N, 8), whether it passes by the box (2, 3), whose entries need no widening.
+py::array_t<bool> pass_box_by(const FloatArray& box, const FloatArray& rays) {
+    const float* b = box.data();
+    const PassBox pass = make_pass_box({{b[0], b[1], b[2]}, {b[3], b[4], b[5]}}, {0.0f, 0.0f});
+    py::array_t<bool> out(rays.shape(0));
+    const Ray* ray = reinterpret_cast<const Ray*>(rays.data());
+    for (py::ssize_t i = 0; i < rays.shape(0); ++i, ++ray)
+        out.mutable_data()[i] =
+            passes_by(pass, ray->origin, ray->direction, max_f(ray->t_min, 0.0f), min_f(ray->t_max, LARGEST_DISTANCE));
     return out;
 }
 
@@ -102,6 +116,19 @@ class MovingAccel {
     py::array_t<u8> any(const FloatArray& rays, const IndexArray& kinds, const FloatArray& times) {
         return with([&](auto& tracer) { return any_of(at_times(tracer, rays, times), pool_, rays, kinds); });
     }
+    // The CPU's scheme: nodes, boxes, primitives and bytes of all rays together, in order.
+    py::dict work(const FloatArray& rays, const FloatArray& times, bool shadows) const {
+        const Ray* first = reinterpret_cast<const Ray*>(rays.data());
+        const size_t count = size_t(rays.shape(0));
+        std::vector<Hit> hits(count);
+        std::vector<u8> blocked(count);
+        Counters total;
+        if (shadows)
+            accel_->any(first, nullptr, blocked.data(), count, times.data(), &total);
+        else
+            accel_->closest(first, nullptr, hits.data(), count, times.data(), &total);
+        return counts(total);
+    }
     bool has_world_apart() const { return trees_ && trees_->has_world_apart(); }
     u64 bytes() const { return accel_ ? accel_->stats().bytes : trees_->stats().bytes; }
     cpu::DeviceImage image() const {
@@ -121,6 +148,7 @@ class MovingAccel {
 void bind_motion(py::module_& m) {
     auto motion = m.def_submodule("motion", "What moves while the shutter is open, over arrays.");
     motion.def("place", &place, "Matrices (K, 3, 4) at evenly spaced times: to_world, to_object at `time`.");
+    motion.def("passes_by", &pass_box_by, "Of rays (N, 8), whether they pass by a box (2, 3): no hit in it is lost.");
     motion.def("shutter_times", &shutter_times, "Times of numbers in [0, 1), by the shutter's curve.");
     py::class_<MovingAccel>(motion, "MovingAccel")
         .def(py::init<const FloatArray&, const IndexArray&, const ByteArray&, const IndexArray&, const IndexArray&,
@@ -129,6 +157,7 @@ void bind_motion(py::module_& m) {
                       bool>())
         .def("closest", &MovingAccel::closest)
         .def("any", &MovingAccel::any)
+        .def("work", &MovingAccel::work)
         .def("bytes", &MovingAccel::bytes)
         .def("has_world_apart", &MovingAccel::has_world_apart)
         .def("device_image",

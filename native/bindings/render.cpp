@@ -1,6 +1,7 @@
 // The renderer as Python sees it: one scene, rendered in steps, readable at any time between them.
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <optional>
 
 #include <pybind11/stl.h>
@@ -20,6 +21,9 @@ namespace {
 // As Refusal has them; luch/cuda/render.py reads the device's under the same names.
 constexpr const char* REFUSAL_NAMES[REFUSALS] = {"refused_emission", "refused_direct", "refused_scatter",
                                                  "refused_flight", "refused_data"};
+
+template <class T>
+using Row = py::array_t<T, py::array::c_style | py::array::forcecast>;
 
 class PyRenderer {
  public:
@@ -47,6 +51,36 @@ class PyRenderer {
         return renderer_->prepare();
     }
 
+    bool set_view(const py::object& scene) {
+        cpu::ViewInput view = read_view(scene);
+        py::gil_scoped_release release;
+        renderer_->set_view(view);
+        return true;
+    }
+
+    void take_structures(const PyRenderer& other) { renderer_->take_structures(*other.renderer_); }
+
+    double origin_reach() const {
+        py::gil_scoped_release release;
+        return renderer_->origin_reach();
+    }
+
+    // float32 (N, 8), as luch::Ray.
+    py::array_t<float> probe_rays() const {
+        std::vector<CameraRay> rays = renderer_->probe_rays();
+        py::array_t<float> out({py::ssize_t(rays.size()), py::ssize_t(sizeof(Ray) / sizeof(float))});
+        for (size_t i = 0; i < rays.size(); i++)
+            std::memcpy(out.mutable_data(py::ssize_t(i), 0), &rays[i].ray, sizeof(Ray));
+        return out;
+    }
+
+    double origin_reach_of(const Row<float>& distances, const Row<u32>& instances) const {
+        std::vector<CameraRay> rays = renderer_->probe_rays();
+        if (size_t(distances.size()) != rays.size() || size_t(instances.size()) != rays.size())
+            throw py::value_error("one distance and one instance for each ray of probe_rays()");
+        return renderer_->origin_reach(rays, distances.data(), instances.data());
+    }
+
     void cancel() { renderer_->cancel(); }
     double step_progress() const { return renderer_->step_progress(); }
 
@@ -63,10 +97,19 @@ class PyRenderer {
                               renderer.trees().stats().depth);
     }
 
+    // The first of them alone: after set_view().
+    static py::tuple device_view(const py::object& self) {
+        return bindings::device_image(self.cast<PyRenderer&>().renderer_->device_image(), self);
+    }
+
     // The film's sums (pixels, channels) float64 and sample counts (pixels,) uint32, to be written by whoever renders
     // in this renderer's place.
     static py::tuple film_arrays(const py::object& self) {
-        return bindings::film_arrays(self.cast<PyRenderer&>().renderer_->film(), self);
+        // They outlive the renderer and its next view: the film is shared with whoever holds them.
+        auto film = std::make_unique<std::shared_ptr<cpu::Film>>(self.cast<PyRenderer&>().renderer_->shared_film());
+        cpu::Film& arrays = **film;
+        py::capsule owner(film.release(), [](void* held) { delete static_cast<std::shared_ptr<cpu::Film>*>(held); });
+        return bindings::film_arrays(arrays, owner);
     }
 
     // What decides which code a device needs.
@@ -104,6 +147,7 @@ class PyRenderer {
         facts["lamp_programs"] = lamp_programs;
         facts["visible_lamps"] = scene.has_visible_lamps;
         facts["world_program"] = scene.has_world && !scene.world_emission.constant;
+        facts["world_reads_camera"] = renderer_->world_reads_camera();
         facts["world_apart"] = renderer_->trees().has_world_apart();
         facts["moves"] = scene.shutter != nullptr;
         facts["trees_move"] = renderer_->trees().moves();
@@ -145,6 +189,7 @@ class PyRenderer {
         d["dropped_instances"] = dropped_instances_.size();
         d["dropped_objects"] = dropped_instances_;
         d["image_warnings"] = image_warnings_;
+        d["structure_builds"] = s.accel_builds;
         d["structure_seconds"] = s.accel_seconds;
         d["lights_seconds"] = s.lights_seconds;
         d["trace_seconds"] = s.trace_seconds;
@@ -249,6 +294,20 @@ void bind_render(py::module_& m) {
              py::arg("device_builds_from") = py::none(),
              "Reads the scene. Raises ValueError, naming the object, for data that does not fit together.")
         .def("prepare", &PyRenderer::prepare, "Builds structures and lights, once, first of all. False when cancelled.")
+        .def(
+            "set_view", &PyRenderer::set_view, py::arg("scene"),
+            "After prepare(): the same scene with another camera, film (of the same light groups and AOVs), limits and "
+            "samples. Nothing is built anew; the film's sums begin anew, and an earlier cancel is forgotten. True, as "
+            "nothing stands against it. Raises ValueError as the constructor, and for another Scene.origin.")
+        .def(
+            "origin_reach", &PyRenderer::origin_reach,
+            "How far from Scene.origin the camera's place may lie for a picture as right as one with the origin there: "
+            "metres, of what a few rays of the present view meet.")
+        .def("take_structures", &PyRenderer::take_structures, py::arg("other"),
+             "Before prepare(): the structures of a renderer of the same geometry, origin and settings are to serve.")
+        .def("probe_rays", &PyRenderer::probe_rays, "Those rays, float32 (N, 8), for another device to trace.")
+        .def("origin_reach_of", &PyRenderer::origin_reach_of, py::arg("distances"), py::arg("instances"),
+             "As origin_reach(), of what they met: distances float32 (N,), inf: nothing; instances uint32 (N,).")
         .def("render", &PyRenderer::render, py::arg("first"), py::arg("count"),
              "Traces samples [first, first + count) of every pixel. False when cancelled.")
         .def("render_regions", &PyRenderer::render_regions, py::arg("begins"), py::arg("ends"),
@@ -260,6 +319,7 @@ void bind_render(py::module_& m) {
              "(mean, deviation, share): float32 (H, W, 3) Combined and one draw of its error; the part of the samples "
              "before the mark that parts them. Asks for Settings.estimate_error.")
         .def("device_images", [](const py::object& self) { return PyRenderer::device_images(self); })
+        .def("device_view", [](const py::object& self) { return PyRenderer::device_view(self); })
         .def("film_arrays", [](const py::object& self) { return PyRenderer::film_arrays(self); })
         .def("device_facts", &PyRenderer::device_facts)
         .def("stats", &PyRenderer::stats, "Counts, bytes and seconds.");

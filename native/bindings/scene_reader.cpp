@@ -526,6 +526,24 @@ struct Reader {
         input.limits.alpha_threshold = py::cast<float>(film.attr("alpha_threshold"));
     }
 
+    // What everything else is read with.
+    void read_names() {
+        py::object film = scene.attr("film");
+        lightgroups = py::cast<std::vector<std::string>>(film.attr("lightgroups"));
+        for (auto aov : py::cast<py::list>(film.attr("aovs")))
+            aovs.push_back(py::cast<std::string>(py::cast<py::tuple>(aov)[0]));
+        auto origin = py::cast<std::array<double, 3>>(scene.attr("origin"));
+        std::copy(origin.begin(), origin.end(), input.origin);
+    }
+
+    void read_view() {
+        py::object film = scene.attr("film");
+        named("Film", [&] { read_film(film); });
+        named("Settings", [&] { read_settings(scene.attr("settings")); });
+        named("Camera", [&] { read_camera(scene.attr("camera"), film); });
+        named("Shutter", [&] { read_shutter(scene.attr("shutter")); });
+    }
+
     void read_curve_settings(const py::object& settings) {
         constexpr std::pair<const char*, CurveShape> SHAPES[] = {
             {"RIBBON", CurveShape::RIBBON}, {"THICK", CurveShape::THICK}, {"THICK_LINEAR", CurveShape::THICK_LINEAR}};
@@ -581,13 +599,7 @@ ReadScene read_scene(const py::object& scene) {
     ReadScene out;
     out.store = std::make_unique<cpu::SceneStore>();
     Reader reader{scene, *out.store, out.input, {}, {}};
-    py::object film = scene.attr("film");
-    reader.lightgroups = py::cast<std::vector<std::string>>(film.attr("lightgroups"));
-    for (auto aov : py::cast<py::list>(film.attr("aovs"))) {
-        reader.aovs.push_back(py::cast<std::string>(py::cast<py::tuple>(aov)[0]));
-    }
-    auto origin = py::cast<std::array<double, 3>>(scene.attr("origin"));
-    std::copy(origin.begin(), origin.end(), out.input.origin);
+    reader.read_names();
     auto each = [&](const char* list, const std::string& kind, void (Reader::*read)(const py::object&)) {
         for (auto item : py::cast<py::list>(scene.attr(list))) {
             auto one = py::reinterpret_borrow<py::object>(item);
@@ -601,12 +613,18 @@ ReadScene read_scene(const py::object& scene) {
     each("images", "Image", &Reader::read_image);
     each("lights", "Light", &Reader::read_lamp);
     named("World", [&] { reader.read_world(scene.attr("world")); });
-    named("Film", [&] { reader.read_film(film); });
-    named("Settings", [&] { reader.read_settings(scene.attr("settings")); });
-    named("Camera", [&] { reader.read_camera(scene.attr("camera"), film); });
-    named("Shutter", [&] { reader.read_shutter(scene.attr("shutter")); });
+    reader.read_view();
     out.warnings = std::move(reader.warnings);
     return out;
+}
+
+cpu::ViewInput read_view(const py::object& scene) {
+    cpu::SceneStore nothing;
+    cpu::RenderInput input;
+    Reader reader{scene, nothing, input, {}, {}};
+    reader.read_names();
+    reader.read_view();
+    return input;
 }
 
 }  // namespace luch::bindings

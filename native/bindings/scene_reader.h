@@ -17,4 +17,7 @@ struct ReadScene {
 // Throws std::invalid_argument for data that does not fit together.
 ReadScene read_scene(const py::object& scene);
 
+// Its camera, film, shutter and settings alone, as far as they may change over a prepared scene. Throws likewise.
+cpu::ViewInput read_view(const py::object& scene);
+
 }  // namespace luch::bindings

@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "luch/math/bounds.h"
+
 namespace luch::cpu {
 namespace {
 
@@ -20,8 +22,8 @@ Fit fit_sensor(const CameraSpec& camera, const FrameSpec& frame, CameraKind kind
     bool wide = frame.width * aspect > frame.height;
     bool horizontal = camera.sensor_fit == "HORIZONTAL" || (camera.sensor_fit == "AUTO" && wide);
     double sensor = camera.sensor_fit == "VERTICAL" ? camera.sensor_height_mm : camera.sensor_width_mm;
-    double half =
-        kind == CameraKind::ORTHOGRAPHIC ? 0.5 * camera.ortho_scale : 0.5 * sensor / std::max(camera.lens_mm, 1e-9);
+    double half = kind == CameraKind::ORTHOGRAPHIC ? 0.5 * camera.ortho_scale
+                                                   : 0.5 * sensor / std::max(camera.lens_mm, SMALLEST_LENS);
     if (horizontal) return {half, static_cast<double>(frame.width), frame.width * aspect};
     return {half, frame.height / aspect, static_cast<double>(frame.height)};
 }
@@ -42,7 +44,7 @@ void set_panorama_map(const CameraSpec& camera, const FrameSpec& frame, CameraKi
     double sides[2] = {static_cast<double>(frame.width), static_cast<double>(frame.height)};
     double shifts[2] = {camera.shift_x, camera.shift_y};
     for (int k = 0; k < 2; ++k) {
-        scale[k] = std::max(high[k] - low[k], 1e-9) / sides[k];
+        scale[k] = std::max(high[k] - low[k], SMALLEST_PLANE) / sides[k];
         centre[k] = -low[k] / scale[k] - shifts[k] * sides[k];
     }
 }
@@ -51,8 +53,8 @@ void set_raster_map(CameraView& view, const CameraSpec& camera, const FrameSpec&
     double cx, cy, sx, sy;  // plane = (raster - centre) * scale
     if (view.kind == CameraKind::EQUIRECTANGULAR) {
         // Kept from 0, which would leave no place for the centre.
-        sx = std::min(camera.longitude[0] - camera.longitude[1], -1e-9) / frame.width;
-        sy = std::min(camera.latitude[0] - camera.latitude[1], -1e-9) / frame.height;
+        sx = std::min(camera.longitude[0] - camera.longitude[1], -SMALLEST_PLANE) / frame.width;
+        sy = std::min(camera.latitude[0] - camera.latitude[1], -SMALLEST_PLANE) / frame.height;
         cx = camera.longitude[0] / sx - camera.shift_x * frame.width;
         cy = (camera.latitude[0] - 1.5707963267948966) / sy - camera.shift_y * frame.height;
     } else if (is_panorama(view.kind)) {
@@ -100,7 +102,8 @@ void set_transforms(CameraView& view, const CameraSpec& camera, const double ori
         }
     }
     double det = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
-    if (!(std::fabs(det) > 1e-12)) throw std::invalid_argument("Camera: its matrix is flat. Reset the camera's scale.");
+    if (!(std::fabs(det) > FLAT_CAMERA))
+        throw std::invalid_argument("Camera: its matrix is flat. Reset the camera's scale.");
     for (int i = 0; i < 12; ++i) view.to_world.m[i] = static_cast<float>(m[i]);
     for (int r = 0; r < 3; ++r) {
         double shift = 0.0;
@@ -116,11 +119,10 @@ void set_transforms(CameraView& view, const CameraSpec& camera, const double ori
 // The near plane moves towards the camera and the far one away by more than the rounding of a ray's
 // origin and of a hit's distance: what lies exactly in a clipping plane is wholly visible.
 void set_clipping(CameraView& view, const CameraSpec& camera) {
-    constexpr double slack = 4e-6;
     double reach = std::hypot(view.to_world.m[3], view.to_world.m[7], view.to_world.m[11]);
-    double margin = slack * camera.clip_start + 5e-7 * reach;
+    double margin = CLIP_SLACK * camera.clip_start + CLIP_PLACE_SLACK * reach;
     double start = std::max(camera.clip_start - margin, 0.0);
-    double end = camera.clip_end * (1.0 + slack);
+    double end = camera.clip_end * (1.0 + CLIP_SLACK);
     double biggest = std::numeric_limits<float>::max();
     view.clip_start = static_cast<float>(std::min(start, biggest));
     view.clip_length = static_cast<float>(std::clamp(end - start, 0.0, biggest));
@@ -132,17 +134,17 @@ void set_lens(CameraView& view, const CameraSpec& camera) {
     view.inverse_focus = 0.0f;
     view.blades = camera.blades < 3 ? 0.0f : static_cast<float>(camera.blades);
     view.blades_rotation = static_cast<float>(camera.blades_rotation);
-    view.inverse_aperture_ratio = static_cast<float>(1.0 / std::max(camera.aperture_ratio, 1e-5));
+    view.inverse_aperture_ratio = static_cast<float>(1.0 / std::max(camera.aperture_ratio, SMALLEST_STOP));
     if (!camera.use_dof) return;
-    double fstop = std::max(camera.fstop, 1e-5);
+    double fstop = std::max(camera.fstop, SMALLEST_STOP);
     double focal_length = view.kind == CameraKind::ORTHOGRAPHIC ? 1.0 : camera.lens_mm * 1e-3;
     view.aperture_radius = static_cast<float>(focal_length / (2.0 * fstop));
-    view.inverse_focus = static_cast<float>(1.0 / std::max(camera.focus_distance, 1e-5));
+    view.inverse_focus = static_cast<float>(1.0 / std::max(camera.focus_distance, SMALLEST_STOP));
 }
 
 void set_fisheye(CameraView& view, const CameraSpec& camera) {
     view.fisheye.half_fov = static_cast<float>(0.5 * camera.fisheye_fov);
-    view.fisheye.lens_mm = static_cast<float>(std::max(camera.fisheye_lens_mm, 1e-6));
+    view.fisheye.lens_mm = static_cast<float>(std::max(camera.fisheye_lens_mm, SMALLEST_FISHEYE));
     for (int k = 0; k < 5; ++k) view.fisheye.k[k] = static_cast<float>(camera.fisheye_polynomial[k]);
 }
 

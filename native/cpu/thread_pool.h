@@ -26,6 +26,8 @@ class ThreadPool {
 
     // From any thread: running and later parallel_fors end with Cancelled before their next chunk.
     void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+    // Forgets it; while nothing runs.
+    void resume() { cancelled_.store(false, std::memory_order_relaxed); }
     // For long loops within a chunk.
     void check_cancelled() const {
         if (cancelled_.load(std::memory_order_relaxed)) throw Cancelled();

@@ -14,7 +14,8 @@ TITLES = {"idle": "**{}: what is idle, simulated all the same.** Time over that 
           "left out": "**{}: what is there, left out.** Time over that of the whole scene; how much the picture changes, "
           "noise included.",
           "moving": "**{}: what moves.** Time over that of the same scene when all stands still; how much the picture "
-          "changes. *hidden*: one that no ray can meet."}  # fmt: skip
+          "changes. *hidden*: one that no ray can meet; *clear*: it stands still and lets light through, beside one that "
+          "does not."}  # fmt: skip
 
 
 def record_of(device: str) -> Path:

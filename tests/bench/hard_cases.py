@@ -20,7 +20,6 @@ import json
 import os
 import platform
 import re
-import resource
 import subprocess
 import sys
 import time
@@ -34,11 +33,11 @@ sys.path[:0] = [str(ROOT / "native"), str(ROOT / "tests")]
 
 import numpy as np  # noqa: E402
 from luch.accel import KINDS, PRECISIONS, Accel  # noqa: E402
-from luch.render import render  # noqa: E402
 from luch.scene import Camera, Mesh  # noqa: E402
 from support import accel_meshes, closed_meshes  # noqa: E402
 from support.checkout import commit  # noqa: E402
 from support.endings import LATE_STAGES, STAGES, break_stages, cancel, interrupt, veils  # noqa: E402
+from support.frames import frame_growth  # noqa: E402
 from support.hard_furnace import closed_glass_energy, closure_energy, plane_energy  # noqa: E402
 from support.hard_geometry import edge_energy, far_plane, leak, room_scene, stack, sun  # noqa: E402
 from support.hard_lights import glass_against_nothing  # noqa: E402
@@ -192,12 +191,7 @@ def stress_figures(o: Options) -> Iterator[Figure]:
         "scene light lost to one broken emitter", "-28.6 %", "0", "", "<= 1 %", f"{max(lost, 0.0):.2%}", lost <= 0.01
     )
     scene = room_scene(0.0, "object", 0.8, size=32, samples=2, device=o.device)
-    sizes = []
-    for frame in range(110):
-        scene.frame = frame
-        render(scene)
-        sizes.append(resident_bytes())
-    growth = (sizes[-1] - sizes[9]) / 100 / 2**20
+    growth = frame_growth(scene)
     yield Figure("memory growth over 100 frames, MiB a frame", ".03", "", "", "<= .05", f"{growth:.3f}", growth <= 0.05)
 
 
@@ -242,11 +236,6 @@ def all_cases() -> tuple[int, int, int, int]:
         if done.returncode == 1 and not of_pixels:
             raise RuntimeError(f"{path.name}: {last}")
     return bad, crashes, hangs, ran
-
-
-def resident_bytes() -> int:
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    return pages * resource.getpagesize()
 
 
 PARTS: dict[str, Callable[[Options], Iterator[Figure]]] = {

@@ -12,6 +12,8 @@ from luch.render import render
 from luch.scene import F32, Camera, Film, Instances, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder, float_word
 from numpy.typing import NDArray
+from support import accel_meshes, closed_meshes
+from support.hard_scenes import glow, mesh_of, scene_of
 
 KINDS = ["PERSP", "ORTHO", "EQUIRECTANGULAR"]
 
@@ -130,6 +132,9 @@ def test_55_a_slice_of_no_thickness_is_finite() -> None:
 def test_56_a_furnace_is_exactly_white_through_any_lens(kind: str, fields: dict[str, Any]) -> None:
     pixels = picture(furnace(Camera(kind=kind, use_dof=True, blades=5, **fields)))
     np.testing.assert_array_equal(pixels, 1.0)
+    ball = mesh_of("Ball", closed_meshes.moved(accel_meshes.icosphere(2), 1e6))  # which rays that are none do not meet
+    camera = Camera(kind=kind, use_dof=True, blades=5, clip_end=1e9, **fields)
+    np.testing.assert_array_equal(picture(scene_of([ball], [glow(1.0)], camera=camera, world=0.0)), 1.0)
 
 
 def test_57_the_poles_of_a_panorama_are_even() -> None:

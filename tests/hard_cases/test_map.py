@@ -12,6 +12,11 @@ PAGE = ROOT / "docs" / "numerics.md"
 COUNT = 65  # of the list of hard cases
 # | 9 | closed room, primary | `tests/hard_cases/test_geometry.py::test_09_...` (bound) |
 ROW = re.compile(r"^\| (\d+) \| ([^|]+) \| (.+) \|$")
+# Constants that stand beside the sums that they come from.
+BESIDE = {
+    "SAGITTA_SLACK": "cpu/accel/build_moving.cpp",
+    "WIDEST": "include/luch/accel/wide_ray.h",
+}
 TEST = re.compile(r"`([\w/]+\.py)::(\w+)`")
 
 
@@ -50,8 +55,30 @@ def test_every_test_with_a_number_is_named() -> None:
 
 def test_every_constant_that_decides_accuracy_is_derived() -> None:
     header = (ROOT / "native" / "include" / "luch" / "math" / "bounds.h").read_text(encoding="utf-8")
-    stated = re.findall(r"^inline constexpr float (.*);", header, re.MULTILINE)
-    names = [name for line in stated for name in re.findall(r"([A-Z][A-Z0-9_]+) = ", line)]
+    header += (ROOT / "native" / "luch" / "bounds.py").read_text(encoding="utf-8").partition("# -- Python's own")[2]
+    stated = re.findall(r"^(?:inline constexpr (?:float|double) (.*);|([A-Z_]+ = ).*$)", header, re.MULTILINE)
+    names = [name for line in stated for name in re.findall(r"([A-Z][A-Z0-9_]+) = ", "".join(line))]
     table = re.findall(r"^\| (`[A-Z][^|]+) \| [^|]+ \| [^|]{20,} \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    assert len(names) > 25
-    assert sorted(names) == sorted(name for cell in table for name in re.findall(r"`(\w+)`", cell))
+    assert len(names) > 120
+    for name, file in BESIDE.items():
+        assert re.search(rf"constexpr float {name} = ", (ROOT / "native" / file).read_text(encoding="utf-8"))
+    assert sorted([*names, *BESIDE]) == sorted(name for cell in table for name in re.findall(r"`(\w+)`", cell))
+
+
+def members(header: str, enum: str) -> set[str]:
+    text = (ROOT / "native" / "include" / "luch" / header).read_text(encoding="utf-8")
+    body = re.search(rf"enum class {enum} : \w+ \{{(.*?)\}};", text, re.DOTALL)
+    assert body
+    return set(re.findall(r"\b[A-Z][A-Z_]+\b(?=,|\s*$)", re.sub(r"//.*", "", body[1]), re.MULTILINE)) - {"NONE_"}
+
+
+def test_everything_that_draws_samples_has_a_chi_square() -> None:
+    """Closures, lights and phase functions, by their enumerations."""
+    text = PAGE.read_text(encoding="utf-8")
+    table = text[text.index("Chi-square of samples against density") : text.index("Weaker than the list asks for")]
+    of_lobes, of_lamps = members("bsdf/closure.h", "LobeType"), members("light/light.h", "LampKind")
+    assert len(of_lobes) == 18 and len(of_lamps) == 5
+    listed = set(re.findall(r"`([A-Z_]+)`", table))
+    assert listed == of_lobes | of_lamps | members("bsdf/phase.h", "PhaseKind")
+    named = TEST.findall(table)
+    assert len(named) == 8 and all(name in named_in(path) for path, name in named)

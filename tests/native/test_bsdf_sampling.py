@@ -42,6 +42,7 @@ LOBES: dict[str, tuple[str, dict[str, Any], int]] = {
     "glass from inside": ("glass", {**GLOSSY}, CAMERA | BACKFACING),
     "glass beckmann": ("glass", {**GLOSSY, "distribution": "BECKMANN"}, CAMERA),
     "refraction": ("refraction", {"roughness": 0.6, "distribution": "GGX"}, CAMERA),
+    "refraction beckmann": ("refraction", {"roughness": 0.6, "distribution": "BECKMANN"}, CAMERA),
     "sheen": ("sheen", {"roughness": 0.5}, CAMERA),
     "velvet": ("velvet", {"roughness": 0.5}, CAMERA),
     "toon": ("toon", {"size": 0.4, "smooth": 2 / 3 - 0.4}, CAMERA),  # its rim lies on a bin edge
@@ -51,6 +52,8 @@ LOBES: dict[str, tuple[str, dict[str, Any], int]] = {
     "film on metal": ("metallic", {"roughness": 0.4, "thin_film_thickness": 400.0}, CAMERA),
     "film on glass": ("glass", {**GLOSSY, "thin_film_thickness": 400.0}, CAMERA),
     "principled": ("principled", {"coat_weight": 0.5, "coat_roughness": 0.4, "sheen_weight": 0.5}, CAMERA),
+    "principled glass": ("principled", {"transmission_weight": 1.0, "roughness": 0.5}, CAMERA),
+    "principled metal": ("principled", {"metallic": 1.0, "anisotropic": 0.5, "roughness": 0.6, **TANGENT}, CAMERA),
     "thin glass": ("principled", {"thin_wall": True, "transmission_weight": 1.0}, CAMERA),
     "thin subsurface": (
         "principled",

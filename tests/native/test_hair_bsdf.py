@@ -103,6 +103,30 @@ def test_sampling_and_evaluation_agree(name: str) -> None:
     assert np.quantile(np.abs(light.sum(axis=1) / pdf[:, None] - drawn["throughput"][kept]), 0.98) < 5e-3
 
 
+@pytest.mark.parametrize(
+    ("node", "name", "low", "high"),
+    [("principled_hair", "roughness", 0.1, 1.0), ("principled_hair", "radial_roughness", 0.1, 1.0),
+     ("principled_hair", "ior", 1.05, 2.0), ("hair", "roughness_along", 0.1, 1.0), ("hair", "roughness_around", 0.1, 1.0)],
+)  # fmt: skip
+def test_lobes_are_continuous(node: str, name: str, low: float, high: float) -> None:
+    """What goes where, by first moments: an eighth of the step makes no change that is as large."""
+    draws = np.random.default_rng(9).random((2048, 3), dtype=np.float32)
+
+    def moments(value: float) -> Any:
+        drawn = core.bsdf.Closures(node, {**LOBES["fibre"][1], name: value} if "_" in node else {name: value},
+                                   **view(20.0, 40.0)).sample(draws)  # fmt: skip
+        light = drawn["throughput"].astype(float).mean(axis=1, keepdims=True)
+        return np.concatenate([light, light * drawn["direction"]], axis=1).mean(axis=0)
+
+    def largest(count: int) -> float:
+        at = np.array([moments(float(value)) for value in np.linspace(low, high, count)])
+        return float(np.abs(np.diff(at, axis=0)).max())
+
+    coarse = largest(9)
+    assert coarse > 1e-4, "nothing changes: the input is not read"
+    assert largest(65) < max(0.4 * coarse, 4e-3)
+
+
 def test_without_tilt_light_may_go_either_way_along_the_fibre() -> None:
     """The model's lobes along a fibre are symmetric; around it they depend on where the fibre is hit, so only directions
     in the plane of fibre and viewer, met in the middle, may be exchanged."""

@@ -10,11 +10,13 @@ import pytest
 from luch import core
 
 from tests.support.lights import (
+    IDENTITY,
     TRIANGLE,
     WORLD,
     contributions,
     irradiance,
     look_down,
+    mesh_light,
     numbers,
     polygon_irradiance,
     rows,
@@ -23,12 +25,6 @@ from tests.support.lights import (
 
 UP = (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
-IDENTITY = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
-
-
-def mesh_light(positions: Any, triangles: Any = ((0, 1, 2),), **material: Any) -> Any:
-    mesh = {"positions": np.asarray(positions, np.float32), "triangles": np.asarray(triangles, np.uint32)} | material
-    return core.light.TestLights(meshes=[mesh], instances=[{"matrix": IDENTITY, "mesh": 0}])
 
 
 def quad_lights(count: int, seed: int = 5, **rest: Any) -> Any:

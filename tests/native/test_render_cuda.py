@@ -13,6 +13,8 @@ import pytest
 from luch._native import core
 from luch.cuda import device, several
 from luch.cuda import render as device_render
+from luch.cuda.render import DeviceRenderer
+from luch.kept import Kept
 from luch.render import Progress, render
 from luch.scene import Image, Instances, Material, Scene
 from luch.shader import ProgramBuilder
@@ -48,6 +50,54 @@ def test_every_pass_is_the_cpus(place: str) -> None:
 def test_the_error_is_the_cpus(place: str) -> None:
     _, cpu, _, ours = both(everything())
     assert ours["error"] == pytest.approx(cpu["error"], rel=1e-4 if place == FIBERS else 0.05)
+
+
+@pytest.mark.parametrize("gpus", [[0], [0, 0]])
+def test_another_view_is_the_cpus_and_nothing_is_built_or_uploaded_for_it(
+    place: str, gpus: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if len(gpus) > 1:
+        monkeypatch.setattr(several, "usable_devices", lambda: gpus)
+    scene, kept = everything(), Kept()
+    scene.images = [Image("Of nothing", np.zeros((37, 41, 4), np.uint8))]  # filled up to whole tiles on the GPU
+    on_device = replace(scene, settings=replace(scene.settings, device="CUDA", gpus=len(gpus)))
+    render(on_device, kept=kept)
+    turned = np.array([[1.0, 0, 0, -0.3], [0, 0.98, -0.199, 0.1], [0, 0.199, 0.98, 5.0]])
+    uploads = []
+    monkeypatch.setattr(device_render, "DeviceCopy", lambda *given: uploads.append(given))
+    films = [replace(scene.film, width=31, height=9), replace(scene.film, border=(2, 3, 12, 11))]
+    for number, film in enumerate(films):
+        camera = replace(scene.camera, matrix=turned, lens_mm=30.0 + number)
+        settings = replace(on_device.settings, samples=3 + number, max_bounces=4)
+        ours = render(replace(on_device, camera=camera, film=film, settings=settings), kept=kept)
+        cpu = render(replace(scene, camera=camera, film=film, settings=replace(settings, device="CPU")))
+        check_equal("Combined", cpu.passes["Combined"], ours.passes["Combined"], place)
+        assert ours.stats["device"].startswith("CUDA") and ours.stats["reused"]
+        if place == FIBERS:
+            assert ours.stats["paths"] == cpu.stats["paths"]
+        kept.rest()  # as a view that stands still
+    check_after_a_wave_that_was_cut_off(scene, on_device, kept, place, monkeypatch)
+    assert kept.builds == 1 and not uploads and kept._held is not None
+    host = core.render.Renderer(scene)
+    assert host.prepare()
+    assert kept._held.renderer.origin_reach() == pytest.approx(host.origin_reach(), rel=1e-5)
+
+
+def check_after_a_wave_that_was_cut_off(
+    scene: Scene, on_device: Scene, kept: Kept, place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace_round = DeviceRenderer._trace_round
+
+    def and_abandon(self: DeviceRenderer, turn: int, rays: int) -> int:
+        self.abandon()
+        return trace_round(self, turn, rays)
+
+    monkeypatch.setattr(DeviceRenderer, "_trace_round", and_abandon)
+    cut_off = render(on_device, kept=kept)
+    monkeypatch.setattr(DeviceRenderer, "_trace_round", trace_round)
+    whole, cpu = render(on_device, kept=kept), render(scene)
+    assert 0 < cut_off.stats["rays"] < whole.stats["rays"]
+    check_equal("Combined", cpu.passes["Combined"], whole.passes["Combined"], place)
 
 
 def plain() -> Scene:

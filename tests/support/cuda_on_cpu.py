@@ -207,6 +207,7 @@ def fake_cupy(devices: int = 1) -> Any:
     return types.SimpleNamespace(
         __version__="fibers", cuda=cuda, asarray=_array, ascontiguousarray=_array,
         asnumpy=np.array, full=lambda *a: np.full(*a).view(Array), empty=lambda *a: np.full(*a[:1], 77, *a[1:]).view(Array),
+        get_default_memory_pool=lambda: types.SimpleNamespace(free_all_blocks=lambda: None),
         zeros=lambda *a: np.zeros(*a).view(Array), flatnonzero=lambda a: np.flatnonzero(a).view(Array), argsort=lambda a: np.argsort(a).view(Array),
     )  # fmt: skip
 

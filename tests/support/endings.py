@@ -19,7 +19,7 @@ from support.media import at, box, bulb, placed
 # Where a render can fail before its result is delivered, and after.
 STAGES = (
     "addon.report.Reporter.__init__", "addon.report.Reporter.warn", "addon.export.scene.export_settings",
-    "addon.result.ResultWriter.__enter__", "luch.render.check_scene", "luch.render.effects_of",
+    "addon.result.ResultWriter.__enter__", "luch.render.check_scene", "luch.kept.effects_of",
     "luch.render._renderer_for", "luch.render._Loop.prepare", "luch.render._Loop._step", "luch.render._Loop._look",
     "luch.render.ledger.shares", "addon.report.Reporter.progress", "addon.result._fit",
 )  # fmt: skip

@@ -6,12 +6,20 @@ import math
 from typing import Any
 
 import numpy as np
+from luch import core
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
 F64 = NDArray[np.float64]
 NOWHERE = 0xFFFFFFFF  # the native core's "no index"
 LAMP, TRIANGLE, WORLD = 1, 2, 3  # EmitterKind
+IDENTITY = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
+
+
+def mesh_light(positions: Any, triangles: Any = ((0, 1, 2),), **material: Any) -> Any:
+    """A mesh that shines, as it stands."""
+    mesh = {"positions": np.asarray(positions, np.float32), "triangles": np.asarray(triangles, np.uint32)} | material
+    return core.light.TestLights(meshes=[mesh], instances=[{"matrix": IDENTITY, "mesh": 0}])
 
 
 def look_down(x: float = 0.0, y: float = 0.0, z: float = 1.0) -> list[float]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import bpy
 import numpy as np
+from luch.render import render
 from mathutils import Matrix
 from numpy.typing import NDArray
 
@@ -85,6 +87,16 @@ def shown(view: Any, window: Window) -> F32:
     update(view, window)
     assert view.preview.wait(WAIT_S) and view.preview.picture is not None, view.text
     return view.preview.picture.pixels
+
+
+def as_fresh(view: Any, window: Window) -> F32:
+    """The same of a view that was never moved, with the origin that this one has kept (luch.kept)."""
+    fresh = type(view)()
+    update(fresh, window)
+    scene = fresh._scene
+    fresh.stop(wait=True)
+    assert view.preview.kept.origin is not None
+    return render(replace(scene, origin=view.preview.kept.origin)).passes["Combined"]
 
 
 def edit(rng: np.random.Generator, window: Window) -> bool:

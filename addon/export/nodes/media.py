@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 from luch import mie, spectrum
+from luch.bounds import SHARPEST_PHASE
 from luch.scene import Medium, Phase
 
 from .tree import Compiler
@@ -23,8 +24,6 @@ EMITTERS: dict[str, VolumeEmitter] = {}
 UNEVEN = "heterogeneous volumes"
 # W/(m2 K4), in the unit of Principled Volume's blackbody: a millionth of radiance.
 STEFAN_BOLTZMANN = 5.670373e-8 * 1e-6 / 3.141592653589793
-# Sharper phase functions cannot be told from a straight line; as in Cycles.
-SHARPEST = 0.999
 
 
 class Uneven(Exception):
@@ -123,7 +122,7 @@ def _scatter(c: Compiler, node: Any, medium: Medium, coefficient: Triple) -> Non
 
 
 def _sharpness(anisotropy: float) -> float:
-    return min(max(anisotropy, -SHARPEST), SHARPEST)
+    return min(max(anisotropy, -SHARPEST_PHASE), SHARPEST_PHASE)
 
 
 @emitter("ShaderNodeVolumeAbsorption")

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 from luch import sky, spectrum, textures
+from luch.bounds import LEAST_MAPPING_SCALE
 from luch.ies import IesError, constant_ies, parse_ies
 from luch.shader import Value, Vector, float_word
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ def mapping_matrix(mapping: bpy.types.TexMapping) -> NDArray[np.float64]:
     kind = mapping.vector_type
     scale = np.array(mapping.scale, np.float64)
     if kind in ("TEXTURE", "NORMAL"):  # these divide
-        scale = np.where(np.abs(scale) < 1e-5, np.copysign(1e-5, scale), scale)
+        scale = np.where(np.abs(scale) < LEAST_MAPPING_SCALE, np.copysign(LEAST_MAPPING_SCALE, scale), scale)
     linear = np.array(mapping.rotation.to_matrix(), np.float64)
     linear = linear @ np.diag(1.0 / scale if kind == "NORMAL" else scale)
     offset = np.zeros(3) if kind in ("VECTOR", "NORMAL") else np.array(mapping.translation, np.float64)

@@ -180,6 +180,10 @@ u32 SceneMotion::add(const SceneView& scene, u32 instance, u32 deformed) {
     const TransformKey* own = scene.motion->keys + way.first_key;
     way.first_key = u32(keys.size());
     keys.insert(keys.end(), own, own + way.key_count);
+    if (way.slide) {
+        slides.push_back(scene.motion->slides[way.slide - 1]);
+        way.slide = u32(slides.size());
+    }
     entries.push_back({way, deformed});
     return u32(entries.size());
 }
@@ -193,7 +197,7 @@ void SceneMotion::finish(const std::vector<Group>& built) {
     }
     for (EntryMotion& entry : entries)
         if (entry.group != NONE) entry.group = number[entry.group];
-    view = {entries.data(), keys.data(), groups.data()};
+    view = {entries.data(), keys.data(), slides.data(), groups.data()};
 }
 
 void SceneMotion::describe(DeviceImage& image, u32 block, const TraceMotion* const& pointer,
@@ -201,6 +205,7 @@ void SceneMotion::describe(DeviceImage& image, u32 block, const TraceMotion* con
     u32 motion = image.add_array("motion", block, pointer, 1);
     image.add_array("moving entries", motion, view.entries, entries.size());
     image.add_array("motion keys", motion, view.keys, keys.size());
+    image.add_array("slides", motion, view.slides, slides.size());
     u32 moving = image.add_array("moving groups", motion, view.groups, groups.size());
     size_t next = 0;
     for (const Group& group : built) {

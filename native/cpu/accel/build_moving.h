@@ -30,6 +30,7 @@ void build_moving_group(Group& group, const SceneView& scene, const std::vector<
 struct SceneMotion {
     std::vector<EntryMotion> entries;
     std::vector<TransformKey> keys;
+    std::vector<Slide> slides;
     std::vector<MovingGroup> groups;
     TraceMotion view{};
 
@@ -38,7 +39,10 @@ struct SceneMotion {
     u32 add(const SceneView& scene, u32 instance, u32 deformed);
     // After the groups were built. Those that change their shape get numbers of their own.
     void finish(const std::vector<Group>& built);
-    u64 bytes() const { return entries.size() * sizeof(EntryMotion) + keys.size() * sizeof(TransformKey); }
+    u64 bytes() const {
+        return entries.size() * sizeof(EntryMotion) + keys.size() * sizeof(TransformKey) +
+               slides.size() * sizeof(Slide);
+    }
     // Everything behind the pointer, which lies in the image's block.
     void describe(DeviceImage& image, u32 block, const TraceMotion* const& pointer,
                   const std::vector<Group>& built) const;

@@ -45,7 +45,7 @@ LUCH_FN u32 line_may_touch(const CurveBlock& block, const CurveBlockRay<P>& ray)
         f8 n = f[axis] + e[axis] * w;
         distance2 += n * n;
     }
-    return lanes_within(distance2, load<f8>(block.radius) + reach * CAPSULE_SLACK);
+    return lanes_within(distance2, load<f8>(block.radius) + reach * LINE_SLACK);
 }
 
 // Calls act(ref, hit) for each piece that the ray meets before *t_max, which act may lower, until it says false.

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "luch/math/bounds.h"
+
 namespace luch::cpu {
 namespace {
 
 constexpr u32 CHUNK = 4096;        // primitives
 constexpr u32 BUCKET_BITS = 8;     // the highest bits of a cell's number
-constexpr double ROUNDING = 1e-9;  // in cells: far above that of double, far below the margin
 
 // A primitive in units of cells from the grid's corner. A cell is a cube of half side `half`: widened by the grid's
 // margin, and by the primitive's own (math/bounds.h, 1: SHEAR_ERROR times its extent).
@@ -46,7 +47,7 @@ CellTest::CellTest(const Primitives& all, u32 ref, const GridShape& grid) {
     int wide = 0;
     for (int k = 0; k < 3; ++k) {
         double lo = double(grid.lo[k]), width = double(grid.width[k]), most = double(grid.size[k] - 1);
-        double margin = double(GRID_MARGIN) + ROUNDING;
+        double margin = double(GRID_MARGIN) + GRID_CELL_ERROR;
         auto index = [&](double x) { return u32(x > 0 ? std::min(x, most) : 0.0); };  // NaN: 0
         first_[k] = index((double(box.lo[k]) - lo) / width - margin);
         last_[k] = index((double(box.hi[k]) - lo) / width + margin);
@@ -68,8 +69,8 @@ void CellTest::set_triangle(const float* corners, const GridShape& grid) {
         widest = std::max(widest, (double(high) - double(low)) / width + 1);
     }
     for (int k = 0; k < 3; ++k)
-        half_[k] =
-            0.5 + double(GRID_MARGIN) + ROUNDING + (double(SHEAR_ERROR) * extent + 1e-44) / double(grid.width[k]);
+        half_[k] = 0.5 + double(GRID_MARGIN) + GRID_CELL_ERROR +
+                   (double(SHEAR_ERROR) * extent + double(DENORMAL_MARGIN)) / double(grid.width[k]);
     double e[2][3];
     for (int k = 0; k < 3; ++k) {
         e[0][k] = v[1][k] - v[0][k];
@@ -79,7 +80,7 @@ void CellTest::set_triangle(const float* corners, const GridShape& grid) {
     normal_[1] = e[0][2] * e[1][0] - e[0][0] * e[1][2];
     normal_[2] = e[0][0] * e[1][1] - e[0][1] * e[1][0];
     // What rounding leaves of a triangle without area must exclude nothing.
-    double slack = 1e-13 * widest * widest;
+    double slack = GRID_FLAT_ERROR * widest * widest;
     offset_ = -(normal_[0] * v[0][0] + normal_[1] * v[0][1] + normal_[2] * v[0][2]);
     radius_ = half_[0] * std::abs(normal_[0]) + half_[1] * std::abs(normal_[1]) + half_[2] * std::abs(normal_[2]) +
               slack * (widest + double(std::max({grid.size[0], grid.size[1], grid.size[2]})));

@@ -1,6 +1,7 @@
 #include "cpu/accel/kd_clip.h"
 
 #include "cpu/accel/simd.h"
+#include "luch/math/bounds.h"
 
 namespace luch::cpu {
 namespace {
@@ -93,7 +94,8 @@ Halves cut_primitive(const Primitives& all, u32 ref, const Box& box, int axis, f
     d4 size = hi - lo;
     double extent = size[0] > size[1] ? size[0] : size[1];
     extent = size[2] > extent ? size[2] : extent;
-    double margin = double(SHEAR_ERROR) * extent + 1e-44;  // as triangle_box: the least denormals do not scale
+    double margin =
+        double(SHEAR_ERROR) * extent + double(DENORMAL_MARGIN);  // as triangle_box: the least denormals do not scale
     auto cut_off = [&](int k, double at, double side) {
         Polygon* other = polygon == polygons ? polygons + 1 : polygons;
         if (cut(*polygon, k, at, side, other)) polygon = other;

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "luch/math/bounds.h"
+
 namespace luch::cpu {
 namespace {
-
-// Of a point on an edge, found in single precision: a weight of three roundings, a product, a sum.
-constexpr float CUT_ERROR = SHEAR_ERROR + 6.0f * EPS;
 
 f8 point(const float* p) { return f8{-p[0], -p[1], -p[2], 0.0f, p[0], p[1], p[2], 0.0f}; }
 void add_edge(f8 a, f8 b, int axis, const float* planes, int count, f8* out) {
@@ -76,7 +75,7 @@ void Clipper::cut(const PrimBox& ref, int axis, const float* planes, int count, 
     f8 before = load_box(ref);
     for (int i = 0; i <= count; ++i) {
         f8 sign = out[i] < 0.0f ? splat<f8>(-2.0f * EPS) : splat<f8>(2.0f * EPS);
-        f8 part = min_of(out[i] + out[i] * sign + (error + 1e-44f), before);
+        f8 part = min_of(out[i] + out[i] * sign + (error + DENORMAL_MARGIN), before);
         out[i] = is_empty(part) ? nothing() : part;
     }
 }

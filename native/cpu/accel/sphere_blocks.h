@@ -3,14 +3,9 @@
 #pragma once
 #include "cpu/accel/leaf.h"
 #include "luch/geometry/sphere.h"
+#include "luch/math/bounds.h"
 
 namespace luch::cpu {
-
-// How far the point of the ray's line that is nearest to a sphere's centre may be off, relative to the distance f
-// between the centre and the ray's origin: f is rounded, 1 EPS; a, b and the direction give s = b / a with
-// gamma(10) |f| / |d|, its product and the sum 3 EPS |f| more; over three axes gamma(25). The test in single
-// precision may be off as much again. |f| is at most the sum over the axes.
-constexpr float SPHERE_SLACK = 64.0f * EPS;
 
 // A ray's line as eight primitives that have a distance from it look at it.
 struct BlockLine {
@@ -29,7 +24,7 @@ struct BlockLine {
 
 // Bits of the lanes whose squared distance is not surely beyond the limit.
 LUCH_FN u32 lanes_within(f8 distance2, f8 limit) {
-    f8 limit2 = limit * limit + 1e-43f;  // denormal squares have few digits
+    f8 limit2 = limit * limit + DENORMAL_SLACK;  // denormal squares have few digits
     // Where a square overflowed or is NaN, the test decides.
     return ~(mask_le(limit2, distance2) & mask_le(distance2, splat<f8>(3.402823466e+38f))) & 255u;
 }
@@ -61,7 +56,7 @@ LUCH_FN u32 line_may_touch(const SphereBlock& block, const SphereBlockRay<P>& ra
         distance2 += p * p;
     }
     f8 radius = load<f8>(block.radius);
-    return lanes_within(distance2, max_of(radius, -radius) * (1.0f + 8.0f * EPS) + reach * SPHERE_SLACK);
+    return lanes_within(distance2, max_of(radius, -radius) * SLAB_UP + reach * LINE_SLACK);
 }
 
 template <Precision P>

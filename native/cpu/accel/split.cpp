@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "luch/math/bounds.h"
+
 namespace luch::cpu {
 namespace {
 
@@ -29,7 +31,7 @@ struct Splitter::BinOf {
             // A flat, overflowing or denormal axis puts everything into bin 0: no cut there.
             bool usable = extent > 1e-36f && extent < 1e38f;
             low[axis + 4] = -centroids.v[axis];
-            scale[axis + 4] = usable ? float(BINS) * 0.9999f / extent : 0.0f;
+            scale[axis + 4] = usable ? float(BINS) * BIN_SHARE / extent : 0.0f;
             low[axis] = scale[axis] = 0.0f;
         }
         low[3] = low[7] = 1.0f;  // ids are tiny floats: keep slow denormal products away

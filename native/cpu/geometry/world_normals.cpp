@@ -2,13 +2,11 @@
 
 #include <cmath>
 
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 
 namespace luch::cpu {
 namespace {
-
-// Scales along the axes, or the angles between them, that differ by less than this share look the same.
-constexpr float EVEN = 1e-4f;
 
 bool is_uneven(const Affine& a) {
     Vec3 columns[3];
@@ -16,8 +14,8 @@ bool is_uneven(const Affine& a) {
     float size = length_squared(columns[0]);
     for (int i = 0; i < 3; i++) {
         int j = i == 2 ? 0 : i + 1;
-        if (std::abs(length_squared(columns[i]) - size) > EVEN * size) return true;
-        if (std::abs(dot(columns[i], columns[j])) > EVEN * size) return true;
+        if (std::abs(length_squared(columns[i]) - size) > EVEN_SCALE * size) return true;
+        if (std::abs(dot(columns[i], columns[j])) > EVEN_SCALE * size) return true;
     }
     return false;
 }

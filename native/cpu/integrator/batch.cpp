@@ -147,7 +147,7 @@ void Batch::generate(const PixelBlock& block) {
 
 void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_sample, u32 count) {
     // Random numbers first, of all samples: that loop vectorises.
-    float filter_u[2][CAMERA_LANES], lens_u[2][CAMERA_LANES] = {};
+    float filter_u[2][CAMERA_LANES], lens_u[2][CAMERA_LANES] = {}, time_u[CAMERA_LANES];
     auto draw = [&](u32 dimension, float (&to)[2][CAMERA_LANES]) {
         with_family(scene_.sampler, [&](auto family) {
             for (u32 i = 0; i < count; i++) {
@@ -156,7 +156,18 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
             }
         });
     };
-    draw(first_dimension(scene_.sampler) + DIM_PIXEL, filter_u);
+    auto draw_with_time = [&](u32 dimension) {
+        with_family(scene_.sampler, [&](auto family) {
+            for (u32 i = 0; i < count; i++) {
+                Vec3 u = sample_3d_of<family.VALUE>(make_sampler(pixel, first_sample + i), dimension);
+                filter_u[0][i] = u.x, filter_u[1][i] = u.y, time_u[i] = u.z;
+            }
+        });
+    };
+    if (has_motion(scene_))
+        draw_with_time(first_dimension(scene_.sampler) + DIM_PIXEL);
+    else
+        draw(first_dimension(scene_.sampler) + DIM_PIXEL, filter_u);
     if (scene_.has_lens) {
         draw(first_dimension(scene_.sampler) + DIM_LENS, lens_u);
         counts_.lens_samples += count;
@@ -165,7 +176,7 @@ void Batch::generate_pixel(const PixelSampler& pixel, u32 px, u32 py, u32 first_
         int k = ray_count_++;
         u32 sample = first_sample + i;
         Sampler sampler = make_sampler(pixel, sample);
-        if (has_motion(scene_)) ray_time_[k] = path_time(scene_, sampler, py);
+        if (has_motion(scene_)) ray_time_[k] = path_time(scene_, time_u[i], py);
         rays_[k] = begin_path(scene_, writer_.film, px, py, sample, sampler, {filter_u[0][i], filter_u[1][i]},
                               {lens_u[0][i], lens_u[1][i]}, time_of(u32(k)), paths_[k]);
         ray_path_[k] = u32(k);

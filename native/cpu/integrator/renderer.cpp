@@ -21,12 +21,6 @@ double seconds_now() {
     return duration<double>(steady_clock::now().time_since_epoch()).count();
 }
 
-u32 ceil_log2(u32 n) {
-    u32 bits = 0;
-    while (bits < 31 && (1u << bits) < n) bits++;
-    return bits;
-}
-
 // One lane, evaluated for its emission.
 Color evaluate_emission(const SceneView& view, const Program& program, const ShadePoints& points) {
     Registers registers(program);
@@ -52,7 +46,7 @@ std::vector<u8> instances_with_subsurface(const SceneView& view) {
 }  // namespace
 
 Renderer::Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input)
-    : input_(input), store_(std::move(store)), pool_(input.threads), film_(input.film) {}
+    : input_(input), store_(std::move(store)), pool_(input.threads), film_(std::make_shared<Film>(input.film)) {}
 
 bool Renderer::prepare() {
     try {
@@ -74,38 +68,12 @@ void Renderer::build_all() {
     build_local_trees();
     stats_.accel_seconds = seconds_now() - start;
     stats_.scene_bytes = store_->bytes();
-    scene_.camera = input_.camera;
-    scene_.view.camera = &scene_.camera;
-    scene_.view.frame_size = {float(input_.frame_width), float(input_.frame_height)};
     scene_.view.origin = {float(input_.origin[0]), float(input_.origin[1]), float(input_.origin[2])};
-    scene_.view.flags = (input_.limits.caustics_reflective ? 0u : u32(SCENE_NO_REFLECTIVE_CAUSTICS)) |
-                        (input_.limits.caustics_refractive ? 0u : u32(SCENE_NO_REFRACTIVE_CAUSTICS));
-    scene_.filter_table = input_.filter;
-    scene_.filter = &scene_.filter_table;
-    scene_.limits = input_.limits;
-    scene_.seed = input_.seed;
-    scene_.sampler = input_.sampler;
-    scene_.first_sample = input_.first_sample;
-    scene_.log2_samples = ceil_log2(std::max(input_.samples_in_all, input_.first_sample + input_.samples));
-    scene_.has_lens = input_.camera.aperture_radius > 0.0f || input_.forced.lens;
-    scene_.mist_start = input_.mist_start;
-    scene_.mist_inverse_depth = input_.mist_depth > 0.0f ? 1.0f / input_.mist_depth : 0.0f;
-    scene_.mist_exponent = input_.mist_exponent;
-    scene_.has_media = input_.media.shown(scene_.view);
-    if (scene_.has_media) {
-        scene_.media =
-            input_.media.view(scene_.view, scene_.camera, float(input_.frame_width), float(input_.frame_height));
-    }
-    build_shutter();
-    // The borders between the camera's place in the shutter's middle and where it is at other times.
-    if (scene_.has_media && scene_.shutter && scene_.shutter->camera_keys) scene_.media.camera_walks = true;
+    look();
     find_constants();
-    start = seconds_now();
     build_lights();
-    stats_.lights_seconds = seconds_now() - start;
-    for (unsigned worker = 0; worker < pool_.size() && !input_.for_device; worker++) {
-        batches_.push_back(std::make_unique<Batch>(scene_, film_.view(), cancelled_));
-    }
+    place_media();
+    make_batches();
 }
 
 // Walks under a surface trace its object in the object's own space, whatever the scene's trees hold.
@@ -117,37 +85,22 @@ void Renderer::mark_in_world() {
     store_->mark_in_world(in_world);
 }
 
-// Paths have times only where something moves: a shutter that is open over what stands still costs nothing.
-void Renderer::build_shutter() {
-    const MotionInput& in = input_.motion;
-    scene_.camera_keys = in.camera;
-    if (!in.shutter || (!scene_.view.motion && in.camera.empty() && !in.zooms)) return;
-    scene_.shutter_times = invert_shutter_curve(in.curve);
-    ShutterView& shutter = scene_.shutter_view;
-    shutter.times = scene_.shutter_times.empty() ? nullptr : scene_.shutter_times.data();
-    shutter.camera = scene_.camera_keys.empty() ? nullptr : scene_.camera_keys.data();
-    shutter.camera_keys = u32(scene_.camera_keys.size());
-    shutter.zooms = in.zooms;
-    for (int end = 0; end < 2; ++end) {
-        shutter.centre[end] = in.camera_ends[end].centre;
-        shutter.scale[end] = in.camera_ends[end].scale;
-    }
-    shutter.rolling = in.rolling;
-    scene_.shutter = &shutter;
-}
-
 Renderer::~Renderer() = default;
 
 void Renderer::build_accel() {
-    AccelRequest request = input_.accel;
-    request.expected_rays = double(film_.view().width) * film_.view().height * input_.samples * EXPECTED_RAYS;
-    ChosenAccel chosen =
-        build_chosen(scene_.view, store_->transparency_flags(input_.forced.transparency), pool_, request);
-    accel_ = std::move(chosen.accel);
-    stats_.accel_name = accel_name(chosen.choice);
-    stats_.accel_reason = chosen.reason;
-    stats_.accel = accel_->stats();
-    scene_.accel = accel_.get();
+    std::vector<std::vector<u8>> transparency = store_->transparency_flags(input_.forced.transparency);
+    if (structures_ == nullptr || structures_->transparency != transparency) {
+        AccelRequest request = input_.accel;
+        request.expected_rays = double(film_->view().width) * film_->view().height * input_.samples * EXPECTED_RAYS;
+        ChosenAccel chosen = build_chosen(scene_.view, transparency, pool_, request);
+        structures_ = std::make_shared<const Structures>(
+            Structures{std::move(chosen.accel), accel_name(chosen.choice), chosen.reason, std::move(transparency)});
+        stats_.accel_builds = 1;
+    }
+    stats_.accel_name = structures_->name;
+    stats_.accel_reason = structures_->reason;
+    stats_.accel = structures_->accel->stats();
+    scene_.accel = structures_->accel.get();
 }
 
 void Renderer::build_local_trees() {
@@ -164,6 +117,7 @@ void Renderer::build_local_trees() {
 void Renderer::build_device_trees() {
     AccelChoice choice = input_.accel.choice;
     choice.leave_from = input_.device_builds_from;
+    stats_.accel_builds = 1;
     trees_ = SceneTrees::build(scene_.view, store_->transparency_flags(input_.forced.transparency), pool_, choice);
     stats_.accel_name = input_.accel.choice.wide ? "CWBVH" : accel_name(input_.accel.choice);
     stats_.accel_reason = input_.accel.automatic ? "on CUDA the compressed wide tree is the fastest in all measured "
@@ -175,7 +129,7 @@ void Renderer::build_device_trees() {
 DeviceImage Renderer::device_image() {
     DeviceImage image;
     task_.scene = scene_;
-    task_.film = film_.view();
+    task_.film = film_->view();
     u32 block = image.add("task", &task_, sizeof(task_));
     store_->describe(image, block, task_.scene.view);
     image.link(block, &task_.scene.view.lights, lights_.describe(image));
@@ -286,6 +240,7 @@ WorldSun Renderer::find_sun(WorldInput& world) {
 }
 
 void Renderer::build_lights() {
+    const double start = seconds_now();
     WorldInput world = input_.world;
     std::vector<float> map;
     world.constant = scene_.world_emission.constant;
@@ -306,6 +261,7 @@ void Renderer::build_lights() {
     scene_.has_lights = lights.emitter_count > 0 || lights.sun_count > 0 || lights.world.present;
     scene_.has_visible_lamps = lights.box_count > 0 || input_.forced.lamps;
     scene_.can_meet_light = scene_.has_world || scene_.has_visible_lamps || input_.forced.emission;
+    world_reads_camera_ = map.size() > 0 && reads_camera_in_world();
     if (input_.forced.world) scene_.world_emission.constant = false;  // after all that chooses by it
     for (u32 sun = 0; sun < lights.sun_count; sun++) {
         if (!lights.lamps[lights.suns[sun]].delta) scene_.can_meet_light = true;
@@ -313,12 +269,7 @@ void Renderer::build_lights() {
     for (u32 m = 0; m < scene_.view.material_count; m++) {
         if (scene_.view.materials[m].program.flags & PROGRAM_EMISSION) scene_.can_meet_light = true;
     }
-    for (u32 m = 0; scene_.has_media && m < scene_.media.count; m++) {
-        if (is_zero(scene_.media.media[m].emission)) continue;
-        scene_.can_meet_light = true;
-        scene_.media.last_turn_matters = 1u;
-    }
-    if (scene_.has_world && !lights.world.present) scene_.media.last_turn_matters = 1u;
+    stats_.lights_seconds = seconds_now() - start;
 }
 
 size_t Renderer::tile_count() const {
@@ -376,7 +327,7 @@ double Renderer::step_progress() const { return double(tiles_done_.load()) / dou
 
 RenderStats Renderer::stats() const {
     RenderStats stats = stats_;
-    stats.film_pixel_bytes = film_.pixel_bytes();
+    stats.film_pixel_bytes = film_->pixel_bytes();
     for (const auto& batch : batches_) stats.counts.add(batch->counts());
     return stats;
 }

@@ -41,8 +41,23 @@ struct MotionInput {
     CameraView camera_ends[2]{};        // when it opens and when it closes, for the field of view
 };
 
+// From where and how a scene is looked at: all that may change while what is built stays.
+struct ViewInput {
+    CameraView camera{};
+    u32 frame_width = 0, frame_height = 0;  // pixels of the full frame
+    PixelFilter filter{};
+    PathLimits limits{};
+    FilmSpec film;
+    u32 seed = 0, samples = 1;
+    SamplerFamily sampler = SamplerFamily::SOBOL;
+    u32 first_sample = 0, samples_in_all = 0;  // as luch.scene.Settings has them
+    float mist_start = 0.0f, mist_depth = 25.0f, mist_exponent = 2.0f;
+    double origin[3] = {0.0, 0.0, 0.0};
+    MotionInput motion;
+};
+
 // What the renderer is made from, beside the SceneStore.
-struct RenderInput {
+struct RenderInput : ViewInput {
     std::vector<LampInput> lamps;
     WorldInput world;
     MediaStore media;
@@ -52,19 +67,8 @@ struct RenderInput {
     AccelRequest accel;
     bool for_device = false;  // another device traces: no structures of this processor, no batches
     u64 device_builds_from = ~u64(0);  // triangles of a group whose tree that device builds itself
-    CameraView camera{};
-    u32 frame_width = 0, frame_height = 0;  // pixels of the full frame
-    PixelFilter filter{};
-    PathLimits limits{};
-    FilmSpec film;
-    u32 seed = 0, samples = 1;
-    SamplerFamily sampler = SamplerFamily::SOBOL;
-    u32 first_sample = 0, samples_in_all = 0;  // as luch.scene.Settings has them
     unsigned threads = 0;
     ForcedWork forced;
-    float mist_start = 0.0f, mist_depth = 25.0f, mist_exponent = 2.0f;
-    double origin[3] = {0.0, 0.0, 0.0};
-    MotionInput motion;
 };
 
 // Tiles of 16 x 16 pixels with 8 samples each fill a batch; neighbouring rays meet the same nodes. luch/adaptive.py
@@ -75,10 +79,18 @@ struct RenderStats {
     BatchCounts counts;
     AccelStats accel;
     std::string accel_name, accel_reason;
+    u32 accel_builds = 0;  // for this picture: 0 where another's structures served
     double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0;
     u64 scene_bytes = 0;
     u64 local_tree_bytes = 0;  // trees of what scatters under its surface
     u64 film_pixel_bytes = 0;  // what the film keeps of one pixel
+};
+
+// What rays are traced through, and what it was built of beside geometry.
+struct Structures {
+    std::unique_ptr<Accel> accel;
+    std::string name, reason;
+    std::vector<std::vector<u8>> transparency;  // SceneStore::transparency_flags
 };
 
 class Renderer {
@@ -86,8 +98,26 @@ class Renderer {
     Renderer(std::unique_ptr<SceneStore> store, const RenderInput& input);
     ~Renderer();
 
+    // Before prepare(): another renderer's structures are to be taken instead of building the same ones. The caller
+    // vouches for the origin, the settings, meshes, instances and objects; materials may differ.
+    void take_structures(const Renderer& other) { structures_ = other.structures_; }
+
     // Builds structures and lights, once, before the first render(). Returns false when cancelled.
     bool prepare();
+
+    // After prepare(), while nothing else runs: the same scene looked at anew. Film, counts and seconds begin again, and
+    // an earlier cancel is forgotten; nothing is built but, where the world's program reads the camera, lights. The
+    // view's origin must be the one of before. Throws as the constructor, and nothing has changed then.
+    void set_view(const ViewInput& view);
+    // Whether set_view() builds lights.
+    bool world_reads_camera() const { return world_reads_camera_; }
+
+    // Rays through pixels all over the film, and how far from the origin the camera's place may be for a picture that
+    // is as right as one with the origin there, metres (bounds.h); of what each ray meets, the distance along it and
+    // the instance.
+    std::vector<CameraRay> probe_rays() const;
+    double origin_reach(const std::vector<CameraRay>& rays, const float* distances, const u32* instances) const;
+    double origin_reach() const;  // as this processor traces them
 
     // Traces samples [first, first + count) of every pixel into the film. Returns false when cancelled; the
     // film then holds what was traced, pixel by pixel with its own sample count.
@@ -98,7 +128,7 @@ class Renderer {
     bool render_regions(const std::vector<u32>& begins, const std::vector<u32>& ends);
     size_t tile_count() const;
 
-    // From any thread, for good: render() returns within a round of a batch, prepare() within one step of building.
+    // From any thread, until set_view(): render() returns within a round of a batch, prepare() within one step of building.
     void cancel() {
         cancelled_.store(true, std::memory_order_relaxed);
         pool_.cancel();
@@ -106,8 +136,8 @@ class Renderer {
     // Share of the running step that is done, 0..1.
     double step_progress() const;
     RenderStats stats() const;
-    const Film& film() const { return film_; }
-    Film& film() { return film_; }
+    const Film& film() const { return *film_; }
+    const std::shared_ptr<Film>& shared_film() const { return film_; }  // set_view() takes another
     const RenderView& scene() const { return scene_; }
     // For another device, after prepare(): the RenderTask (block 0) and the scene's arrays behind it. The film's sums
     // and the wavefront are left to the device. The image borrows from the renderer.
@@ -124,22 +154,28 @@ class Renderer {
     void build_accel();
     void build_local_trees();
     void build_device_trees();
+    // view.cpp: what changes with the camera
+    void look();
+    bool reads_camera_in_world() const;
+    void build_shutter();
+    void place_media();
+    void make_batches();
     void find_constants();
     void build_lights();
     void mark_in_world();
-    void build_shutter();
     WorldSun find_sun(WorldInput& world);  // and tells the world of it
     std::vector<float> world_map(int width, int height, const WorldSun& sun);
 
     RenderInput input_;
     std::unique_ptr<SceneStore> store_;
     ThreadPool pool_;
-    std::unique_ptr<Accel> accel_;
+    std::shared_ptr<const Structures> structures_;
     std::unique_ptr<LocalTrees> local_trees_;
-    std::unique_ptr<SceneTrees> trees_;  // instead of accel_, for another device
+    std::unique_ptr<SceneTrees> trees_;  // instead of structures_, for another device
     LightStore lights_;
     RenderScene scene_;
-    Film film_;
+    std::shared_ptr<Film> film_;
+    bool world_reads_camera_ = false;  // and has a map that light is sampled by
     RenderTask task_{};
     std::vector<std::unique_ptr<Batch>> batches_;
     std::atomic<bool> cancelled_{false};

@@ -4,6 +4,8 @@
 
 #include "cpu/light/build.h"
 
+#include "luch/math/bounds.h"
+
 namespace luch::cpu {
 namespace {
 
@@ -20,8 +22,7 @@ bool can_be_hit(const LampView& lamp) {
 Box box_of(const LampView& lamp, u32 index) {
     bool ball = lamp.kind == LampKind::SPHERE || lamp.kind == LampKind::DISK;
     Vec3 half = ball ? make_vec3(lamp.radius) : abs_v(lamp.axis_u) * lamp.half_u + abs_v(lamp.axis_v) * lamp.half_v;
-    // Rounding of the box test grows with the distance from the origin.
-    half = half * 1.00001f + abs_v(lamp.position) * 1e-6f + make_vec3(1e-7f);
+    half = half * LAMP_BOX_GROWTH + abs_v(lamp.position) * LAMP_BOX_PLACE + make_vec3(LAMP_BOX_LEAST);
     return {lamp.position - half, lamp.position + half, index};
 }
 

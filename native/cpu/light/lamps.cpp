@@ -28,14 +28,14 @@ void set_spot(const LampInput& in, LampView* lamp) {
     lamp->spot = true;
     lamp->cos_half_spot = std::cos(half);
     float smooth = (1.0f - lamp->cos_half_spot) * in.spot_blend;
-    lamp->spot_scale = 1.0f / max_f(smooth, 1e-12f);
-    lamp->half_cot_half_spot = 0.5f / max_f(std::tan(half), 1e-12f);
+    lamp->spot_scale = 1.0f / max_f(smooth, SMALLEST_SPOT);
+    lamp->half_cot_half_spot = 0.5f / max_f(std::tan(half), SMALLEST_SPOT);
     // The widest half angle of a cone that the lamp's scale has made elliptic.
     float wide = max_f(length(column(in.matrix, 0)), length(column(in.matrix, 1)));
     double stretch = safe_divide(wide, length(column(in.matrix, 2)));
-    double widest = std::atan(stretch * std::tan(std::min(static_cast<double>(half), 1.5707)));
+    double widest = std::atan(stretch * std::tan(std::min(static_cast<double>(half), FLATTEST_CONE)));
     double sine = std::sin(0.5 * widest);
-    lamp->spot_one_minus_cos = static_cast<float>(std::max(2.0 * sine * sine, 1e-12));
+    lamp->spot_one_minus_cos = static_cast<float>(std::max(2.0 * sine * sine, double(SMALLEST_SPOT)));
 }
 
 Color scaled_color(const LampInput& in, float factor) {
@@ -59,7 +59,7 @@ void make_point(const LampInput& in, LampView* lamp) {
 void make_sun(const LampInput& in, LampView* lamp) {
     float half = 0.5f * clamp_f(in.angle, 0.0f, PI);
     lamp->kind = LampKind::SUN;
-    lamp->delta = half < 1e-6f;
+    lamp->delta = half < SMALLEST_HALF_SUN;
     float sine = std::sin(half), half_sine = std::sin(0.5f * half);
     lamp->cos_half_angle = std::cos(half);
     lamp->one_minus_cos_half_angle = 2.0f * half_sine * half_sine;
@@ -79,10 +79,10 @@ void make_area(const LampInput& in, LampView* lamp) {
     lamp->half_v = 0.5f * max_f((one_size ? in.size : in.size_y) * length(y), SMALLEST_EXTENT);
     lamp->area = 4.0f * lamp->half_u * lamp->half_v * (round ? QUARTER_PI : 1.0f);
     double half = 0.5 * clamp_f(in.spread, 0.0f, PI);
-    lamp->delta = half < 1e-5;
-    lamp->tan_half_spread = half > 1.5707 ? INFINITE_DISTANCE : static_cast<float>(std::tan(half));
+    lamp->delta = half < SMALLEST_SPREAD;
+    lamp->tan_half_spread = half > FLATTEST_CONE ? INFINITE_DISTANCE : static_cast<float>(std::tan(half));
     // tan a - a, by its series where it would cancel.
-    double slats = half < 0.02 ? half * half * half / 3.0 * (1.0 + 0.4 * half * half) : std::tan(half) - half;
+    double slats = half < SPREAD_SERIES ? half * half * half / 3.0 * (1.0 + 0.4 * half * half) : std::tan(half) - half;
     lamp->spread_scale = slats > 0.0 ? static_cast<float>(1.0 / slats) : 0.0f;
     float per_area = in.normalize ? 1.0f / lamp->area : 1.0f;
     lamp->radiance = scaled_color(in, per_area * (lamp->delta ? 1.0f : INV_PI));
@@ -143,7 +143,7 @@ EmitterBounds lamp_bounds(const LampView& lamp) {
         float peak = 1.0f;
         b.emission_rad = HALF_PI;
         if (lamp.delta) {
-            b.emission_rad = 0.02f;
+            b.emission_rad = NARROWEST_BEAM;
         } else if (lamp.tan_half_spread != INFINITE_DISTANCE) {
             b.emission_rad = std::atan(lamp.tan_half_spread);
             peak = lamp.tan_half_spread * lamp.spread_scale;

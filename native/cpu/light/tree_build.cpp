@@ -6,6 +6,8 @@
 
 #include "cpu/light/build.h"
 
+#include "luch/math/bounds.h"
+
 namespace luch::cpu {
 namespace {
 
@@ -65,7 +67,7 @@ float orientation_measure(const Bounds& b) {
 // By the diagonal, not the surface: lamps on a line or in a plane have extent too.
 float cost_measure(const Bounds& b) {
     if (b.count == 0) return 0.0f;
-    return b.intensity * (length_squared(b.high - b.low) + 1e-12f) * orientation_measure(b);
+    return b.intensity * (length_squared(b.high - b.low) + LEAST_DIAGONAL2) * orientation_measure(b);
 }
 
 // A cone that holds all normals of a range: around their mean, as wide as the farthest.
@@ -89,7 +91,7 @@ Cone cone_of(const Item* begin, const Item* end, const Bounds& b) {
         least = min_f(least, cone.two_sided ? abs_f(c) : c);
         widest = max_f(widest, i->e.normals_rad);
     }
-    float angle = end - begin == 1 ? 0.0f : std::acos(clamp_f(least, -1.0f, 1.0f)) + 1e-3f;
+    float angle = end - begin == 1 ? 0.0f : std::acos(clamp_f(least, -1.0f, 1.0f)) + LIGHT_CONE_MARGIN;
     cone.normals_rad = min_f(angle + widest, PI);
     return cone;
 }

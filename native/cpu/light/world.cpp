@@ -3,11 +3,10 @@
 
 #include "cpu/light/build.h"
 #include "luch/light/world.h"
+#include "luch/math/bounds.h"
 
 namespace luch::cpu {
 namespace {
-
-constexpr double EVEN_WORLD_SHARE = 0.02;
 
 float usable_luminance(Color c) {
     float l = luminance(abs_v(c));
@@ -100,14 +99,14 @@ WorldLight build_world(const WorldInput& in, WorldArrays* arrays) {
         w.density = arrays->density.data();
         w.row_cdf = arrays->row_cdf.data();
         w.column_cdf = arrays->column_cdf.data();
-        w.constant = !(rise > 0.02 * mean);  // as good as even
+        w.constant = !(rise > EVEN_WORLD_SHARE * mean);  // as good as even
     }
     // Only what the map's samples are for counts against the other lights; an even world hardly does: sampled
     // light from it is worth no more than what rays find there, and each such sample is one less for a lamp.
     double map_irradiance = 3.14159265358979 * (w.constant ? EVEN_WORLD_SHARE * mean : rise);
     double sine = std::sin(0.25 * in.sun_angle), disk = std::sin(0.5 * in.sun_angle);
     double sun_irradiance = in.has_sun ? 3.14159265358979 * disk * disk * usable_luminance(in.sun_radiance) : 0.0;
-    w.has_sun = sun_irradiance > 0.0 && in.sun_angle > 1e-6f;
+    w.has_sun = sun_irradiance > 0.0 && in.sun_angle > SMALLEST_WORLD_SUN;
     if (w.has_sun) {
         w.sun_direction = normalize_or(in.sun_direction, {0.0f, 0.0f, 1.0f});
         w.sun_one_minus_cos = static_cast<float>(2.0 * sine * sine);

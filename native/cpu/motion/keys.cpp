@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "luch/camera/shutter.h"
+#include "luch/math/bounds.h"
 
 namespace luch::cpu {
 namespace {
@@ -11,7 +12,6 @@ namespace {
 using Linear = std::array<double, 9>;
 
 constexpr int POLAR_STEPS = 100;       // it converges quadratically; worse matrices are flat
-constexpr double POLAR_ENOUGH = 1e-12;
 
 // The transposed inverse; false for a flat matrix.
 bool inverse_transposed(const Linear& a, Linear* out) {

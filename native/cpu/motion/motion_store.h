@@ -27,6 +27,7 @@ class MotionStore {
     MotionView view_{};
     std::vector<InstanceMotion> instances_;
     std::vector<TransformKey> keys_;
+    std::vector<Slide> slides_;
     std::vector<MeshMotion> meshes_;
     std::vector<float> positions_, normals_, curve_points_;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "cpu/sky/atmosphere.h"
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 
 namespace luch::cpu {
@@ -37,7 +38,7 @@ struct Coefficients {
 Coefficients coefficients_at(double altitude, const AtmosphereSettings& s) {
     const float h = float(std::max(altitude, 0.0));
     const float air = std::exp(-0.07771971f * std::pow(h, 1.16364243f)) * float(s.air);
-    const float log_h = std::log(std::max(h, 1e-4f));
+    const float log_h = std::log(std::max(h, SKY_LOWEST_KM));
     const float off_layer = log_h - 3.22261f;
     const float ozone = 3.78547397e20f * std::exp(-off_layer * off_layer * 5.55555555f - log_h) * float(s.ozone);
     const float background = AEROSOL_BACKGROUND / AEROSOL_DENSITY;
@@ -172,7 +173,7 @@ class SkyRow {
         const Bands &zenith_below = table_.ground()[LUT_COSINES - 1], &zenith_here = step_.row[LUT_COSINES - 1];
         for (int b = 0; b < BANDS; b++) {
             const float kept = std::exp(-length * step_.c.extinction[b]);
-            const float integral = (1.0f - kept) / std::max(step_.c.extinction[b], 1e-7f);
+            const float integral = (1.0f - kept) / std::max(step_.c.extinction[b], SKY_THINNEST);
             step_.weight[b] = through[b] * integral * SUN_IRRADIANCE[b];
             step_.from_ground[b] =
                 solid_angle * (GROUND_ALBEDO * INV_PI * INV_PI * 0.25f) * zenith_below.v[b] / zenith_here.v[b];

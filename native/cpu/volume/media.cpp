@@ -6,17 +6,12 @@
 
 #include "cpu/volume/camera_media.h"
 #include "cpu/volume/phase_tables.h"
+#include "luch/math/bounds.h"
 
 namespace luch::cpu {
 namespace {
 
-// Coefficients below are none: a thousand kilometres of it change light by 0.1 %. Above, mean free paths are shorter
-// than any picture shows.
-constexpr float THINNEST = 1e-9f, DENSEST = 1e9f;
-// Beyond it a phase function is a straight line to single precision.
-constexpr float SHARPEST = 0.999f;
-
-float coefficient(float x) { return x >= THINNEST ? std::min(x, DENSEST) : 0.0f; }  // NaN: 0
+float coefficient(float x) { return x >= THINNEST_MEDIUM ? std::min(x, DENSEST_MEDIUM) : 0.0f; }  // NaN: 0
 Color coefficient(Color c) { return {coefficient(c.x), coefficient(c.y), coefficient(c.z)}; }
 
 Color radiance(Color c) {
@@ -36,10 +31,10 @@ u32 MediaStore::add(const MediumInput& input) {
         if (is_zero(lobe.sigma_s)) continue;
         if (phase.kind == "HENYEY_GREENSTEIN") {
             lobe.kind = PhaseKind::HENYEY_GREENSTEIN;
-            lobe.g = std::clamp(phase.a, -SHARPEST, SHARPEST);
+            lobe.g = std::clamp(phase.a, -SHARPEST_PHASE, SHARPEST_PHASE);
         } else if (phase.kind == "DRAINE" || phase.kind == "FOURNIER_FORAND") {
             bool draine = phase.kind == "DRAINE";
-            if (draine) lobe.g = std::clamp(phase.a, -SHARPEST, SHARPEST);
+            if (draine) lobe.g = std::clamp(phase.a, -SHARPEST_PHASE, SHARPEST_PHASE);
             auto table = draine ? draine_table(lobe.g, phase.b) : fournier_forand_table(phase.a, phase.b);
             tables_.insert(tables_.end(), table.begin(), table.end());
         } else {

@@ -3,19 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "luch/math/bounds.h"
+
 namespace luch::cpu {
 namespace {
 
 constexpr double PI_D = 3.14159265358979323846;
-// Half of the knots lie evenly over t = sin^2(angle / 2), the others by powers from here on (an angle of 2e-7, past
-// the peak of g = 0.999 and most of that of Fournier and Forand, which has no end): a step of 3.2 %, so lines between
-// knots are within 5e-4 of what such peaks fall off by.
-constexpr double FIRST_KNOT = 1e-14;
+// Half of the knots lie evenly over t = sin^2(angle / 2), the others by powers from PHASE_FIRST_KNOT on.
 
 std::vector<double> knots() {
     constexpr int half = int(PHASE_KNOTS - 1) / 2;
     std::vector<double> t{0.0};
-    for (int i = 0; i < half; ++i) t.push_back(FIRST_KNOT * std::pow(1.0 / FIRST_KNOT, double(i) / half));
+    for (int i = 0; i < half; ++i) t.push_back(PHASE_FIRST_KNOT * std::pow(1.0 / PHASE_FIRST_KNOT, double(i) / half));
     for (int i = 0; i < half; ++i) t.push_back((i + 1.0) / half);
     std::sort(t.begin(), t.end());
     return t;
@@ -30,7 +29,7 @@ std::vector<float> make_table(Density&& density) {
     std::vector<double> sums{0.0};
     for (u32 i = 0; i < PHASE_KNOTS; ++i) {
         table[i] = float(t[i]);
-        table[PHASE_KNOTS + i] = float(std::max(density(std::max(t[i], FIRST_KNOT)), 0.0));
+        table[PHASE_KNOTS + i] = float(std::max(density(std::max(t[i], PHASE_FIRST_KNOT)), 0.0));
         if (i == 0) continue;
         double width = double(table[i]) - double(table[i - 1]);
         below += 0.5 * width * (double(table[PHASE_KNOTS + i]) + double(table[PHASE_KNOTS + i - 1]));
@@ -55,7 +54,8 @@ std::vector<float> draine_table(double g, double alpha) {
 }
 
 std::vector<float> fournier_forand_table(double refractive_index, double backscatter) {
-    double n = std::clamp(refractive_index, 1.01, 2.0), b = std::clamp(backscatter, 1e-4, 0.4999);
+    double n = std::clamp(refractive_index, 1.01, 2.0),
+           b = std::clamp(backscatter, LEAST_BACKSCATTER, 0.5 - LEAST_BACKSCATTER);
     double scale = 4.0 / (3.0 * (n - 1.0) * (n - 1.0));  // delta = scale t
     double at_90 = 0.5 * scale, at_180 = scale;
     double v = -std::log(2.0 * b * (at_90 - 1.0) + 1.0) / std::log(at_90);
@@ -68,8 +68,10 @@ std::vector<float> fournier_forand_table(double refractive_index, double backsca
     };
     return make_table([&](double t) {
         double delta = scale * t;
-        // Numerator and denominator both vanish at delta = 1: taken from both sides, which are alike to 1e-6.
-        if (std::fabs(delta - 1.0) < 1e-3) return 0.5 * (at(0.999, 0.999 / scale) + at(1.001, 1.001 / scale));
+        // Numerator and denominator both vanish at delta = 1: taken from both sides.
+        constexpr double before = 1.0 - FOURNIER_GAP, behind = 1.0 + FOURNIER_GAP;
+        if (std::fabs(delta - 1.0) < FOURNIER_GAP)
+            return 0.5 * (at(before, before / scale) + at(behind, behind / scale));
         return at(delta, t);
     });
 }

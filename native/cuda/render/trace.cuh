@@ -21,7 +21,9 @@ struct TraceTask {
     Hit* hits;  // of trace_closest, by ray
     u8* blocked;  // of trace_any: Blocked values, by ray
     const u32* count;  // rays
-    u32* next;  // 0 when the kernel begins; how many rays were fetched when it ends, at least
+    // 0 when the kernel begins; how many rays were fetched when it ends, at least. Two: the second is of the kernel that
+    // comes after, for what moves.
+    u32* next;
     const float* times;  // of each ray; null: the shutter's middle. Read where LUCH_PLAN_MOTION is 1
     u32* ticks;  // of each ray, its clock cycles. Written where LUCH_TIMED_RAYS is 1
 };

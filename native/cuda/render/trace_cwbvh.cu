@@ -20,10 +20,6 @@ LUCH_PERSISTENT_TRACE_KERNEL(trace_closest_one)(LUCH_TRACE_ARGUMENTS) {
 LUCH_PERSISTENT_TRACE_KERNEL(trace_any_one)(LUCH_TRACE_ARGUMENTS) {
     luch::trace_persistent<luch::Walker<luch::Precision::LUCH_PRECISION, true>>(luch::OneGroupRays{scene, task});
 }
-// Between two kernels that trace the same rays.
-LUCH_TRACE_KERNEL(fetch_anew)(LUCH_TRACE_ARGUMENTS) {
-    if (threadIdx.x == 0) *task.next = 0;
-}
 LUCH_TRACE_KERNEL(trace_closest_simple)(LUCH_TRACE_ARGUMENTS) {
     luch::trace_closest_simple<luch::Precision::LUCH_PRECISION>(scene, task);
 }

@@ -13,7 +13,10 @@ struct SceneRays {
 };
 
 __device__ __forceinline__ u32 ray_count(const SceneRays& rays) { return ray_count(rays.task); }
-__device__ __forceinline__ u32* next_ray(const SceneRays& rays) { return rays.task.next; }
+// After the kernel of what stands still: the next of the task's two counters.
+__device__ __forceinline__ u32* next_ray(const SceneRays& rays) {
+    return rays.task.next + (rays.scene.world_visibility != 0u);
+}
 
 template <Precision P>
 struct SceneAside : RayClock {
@@ -67,6 +70,7 @@ struct SceneWalker {
         if (!busy) return finish(rays);
         if (rays.scene.world_visibility != 0u) begin_after_world(rays, i);
         if (!busy) return;
+        if (passes_movers_by(rays.scene, ray, aside->best.t)) return finish(rays);
         aside->t_min = ray.t_min;
         aside->kinds = kinds_of(rays.task, i);
         aside->tested.direction = ray.direction;  // for go_together

@@ -1,4 +1,4 @@
-// Groups of primitives put into the world: what the CPU's scheme (cpu/accel/accel.cpp) and the views for any device
+// Groups of primitives put into the world: what the CPU's scheme (cpu/accel/two_level.h) and the views for any device
 // (two_level.h) have in common, so that their hits are the same bit for bit.
 #pragma once
 #include "luch/geometry/ray.h"

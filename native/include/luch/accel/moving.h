@@ -35,6 +35,7 @@ struct EntryMotion {
 struct TraceMotion {
     const EntryMotion* entries;
     const TransformKey* keys;
+    const Slide* slides;
     const MovingGroup* groups;
 };
 
@@ -80,7 +81,7 @@ LUCH_FN bool test_primitive(const MovingPrimitives& all, const PrimitiveRay<P>& 
 
 // The instance's transform into its own space.
 LUCH_FN_SLOW Affine moved_to_object(const TraceMotion& motion, const InstanceMotion& transform, float time) {
-    return inverse_of(transform_at(motion.keys, transform, time));
+    return to_object_at(motion.keys, motion.slides, transform, time);
 }
 
 // A ray of the scene in an entry that moves, its interval not yet set; false if the transform leaves no ray. Entry: with

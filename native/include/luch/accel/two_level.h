@@ -4,6 +4,7 @@
 #include "luch/accel/cwbvh.h"
 #include "luch/accel/instances.h"
 #include "luch/accel/moving.h"
+#include "luch/accel/pass_by.h"
 #include "luch/plan.h"
 
 namespace luch {
@@ -62,6 +63,13 @@ LUCH_FN bool clamp_interval(Ray* ray) {
 template <class Structure>
 LUCH_FN WideRay top_ray(const TwoLevelView<Structure>& scene, const Ray& ray) {
     return make_wide_ray(ray, scene.top.root, widening(scene.error, ray.origin));
+}
+
+// Whether a ray has nothing to do with what moves, where that lies apart from the world. ray: clamped.
+template <class Structure>
+LUCH_FN bool passes_movers_by(const TwoLevelView<Structure>& scene, const Ray& ray, float t_max) {
+    if (!plan::MOTION || scene.world_visibility == 0u) return false;
+    return passes_by(make_pass_box(scene.top.root, scene.error), ray.origin, ray.direction, ray.t_min, t_max);
 }
 
 // The group of an entry whose mesh changes its shape.
@@ -138,6 +146,7 @@ LUCH_FN Hit closest_hit(const TwoLevelView<Structure>& scene, const Ray& given, 
         closest_hit<P>(scene.world.structure, scene.world.primitives, ray, &found, none);
         if (found.ref != NONE) best = hit_in_scene(scene.world, NONE, found);
     }
+    if (passes_movers_by(scene, ray, best.t)) return best.prim == NONE ? no_scene_hit() : best;
     return closest_in_top<P>(scene, ray, kinds, time, best);
 }
 
@@ -149,7 +158,7 @@ LUCH_FN u8 any_hit(const TwoLevelView<Structure>& scene, const Ray& given, u32 k
     NoCounters none;
     u8 blocked = BLOCKED_NOT;
     if (scene.world_visibility & kinds) blocked = any_hit<P>(scene.world.structure, scene.world.primitives, ray, none);
-    if (blocked == BLOCKED_OPAQUE) return blocked;
+    if (blocked == BLOCKED_OPAQUE || passes_movers_by(scene, ray, ray.t_max)) return blocked;
     AnyOfEntries<P, Structure> entries = {scene, ray, kinds, time, blocked};
     LocalStack<> stack;
     walk(scene.top, top_ray(scene, ray), stack, entries, none);

@@ -22,6 +22,7 @@
 #pragma once
 #include "luch/geometry/box.h"
 #include "luch/geometry/ray.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -61,7 +62,7 @@ struct WideRay {
     u32 octant;  // bit 2: x is negative, 1: y, 0: z
     u32 byte_bias;  // BYTE_BIAS
     // Never below the distance of a hit at t.
-    LUCH_FN float upper(float t) const { return fused(t, scale * (1.0f + 4.0f * EPS), 1e-37f); }
+    LUCH_FN float upper(float t) const { return fused(t, scale * (1.0f + WIDE_HIT_ERROR), 1e-37f); }
     LUCH_FN bool negative(int axis) const { return octant >> (2 - axis) & 1u; }
 };
 
@@ -80,10 +81,10 @@ LUCH_FN WideRay make_wide_ray(const Ray& ray, const Box& root, float extra = 0.0
         float reciprocal = 1.0f / (parallel ? 0.5f * SHEAR_ERROR : slope);
         float x = parallel ? 0.0f : SHEAR_ERROR * reciprocal;
         out.origin[axis] = ray.origin[axis];
-        out.near_rdir[axis] = sign * (reciprocal * (1.0f - x) * (1.0f - 16.0f * EPS));
-        out.far_rdir[axis] = sign * (reciprocal * (1.0f + 1.34f * x) * (1.0f + 16.0f * EPS));
+        out.near_rdir[axis] = sign * (reciprocal * (1.0f - x) * (1.0f - WIDE_SLAB_ERROR));
+        out.far_rdir[axis] = sign * (reciprocal * (1.0f + 1.34f * x) * (1.0f + WIDE_SLAB_ERROR));
         out.shift[axis] = parallel ? 12.0f * reach : 0.0f;
-        if (extra > 0.0f) out.shift[axis] += extra * abs_f(out.far_rdir[axis]) * (1.0f + 16.0f * EPS);
+        if (extra > 0.0f) out.shift[axis] += extra * abs_f(out.far_rdir[axis]) * (1.0f + WIDE_SLAB_ERROR);
         out.octant |= (float_bits(ray.direction[axis]) >> 31) << (2 - axis);
     }
     return out;

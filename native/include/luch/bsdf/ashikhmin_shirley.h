@@ -12,10 +12,10 @@ LUCH_FN float phong_exponent(float alpha) { return 2.0f / sqr(alpha) - 2.0f; }
 LUCH_FN_SLOW LobeValue eval_ashikhmin_shirley(const Lobe& l, Vec3 wo, Vec3 wi) {
     float cos_o = dot(l.normal, wo), cos_i = dot(l.normal, wi);
     if (is_phong_mirror(l) || !(cos_o >= 0.0f && cos_i >= 0.0f)) return no_value();
-    cos_o = max_f(cos_o, 1e-6f);
-    cos_i = max_f(cos_i, 1e-6f);
+    cos_o = max_f(cos_o, SMALLEST_COSINE);
+    cos_i = max_f(cos_i, SMALLEST_COSINE);
     Vec3 h = normalize_or(wo + wi, l.normal);
-    float cos_ho = max_f(abs_f(dot(h, wo)), 1e-6f), cos_h = max_f(dot(h, l.normal), 1e-6f);
+    float cos_ho = max_f(abs_f(dot(h, wo)), SMALLEST_COSINE), cos_h = max_f(dot(h, l.normal), SMALLEST_COSINE);
     float n_x = phong_exponent(l.alpha_x), n_y = phong_exponent(l.alpha_y);
     float exponent = n_x;
     if (is_anisotropic(l)) {

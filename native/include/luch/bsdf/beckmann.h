@@ -1,5 +1,6 @@
 // The Beckmann distribution's own parts: masking and the sampling of visible normals.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
@@ -13,7 +14,7 @@ LUCH_FN float erf_f(float x) {
 
 // Giles 2010, "Approximating the erfinv function", single precision; x in (-1, 1).
 LUCH_FN float erf_inverse_f(float x) {
-    x = clamp_f(x, -0.9999999f, 0.9999999f);
+    x = clamp_f(x, -ERF_INVERSE_END, ERF_INVERSE_END);
     float w = -log_f((1.0f - x) * (1.0f + x));
     float p;
     if (w < 5.0f) {
@@ -50,7 +51,7 @@ LUCH_FN float beckmann_lambda(float alpha2_tan2) {
     return ((0.396f * a - 1.259f) * a + 1.0f) / ((2.181f * a + 3.535f) * a);
 }
 LUCH_FN float beckmann_lambda_exact(float alpha2_tan2) {
-    if (alpha2_tan2 < 1e-2f) return 0.0f;  // below 1e-46
+    if (alpha2_tan2 < BECKMANN_NO_SHADOW) return 0.0f;
     float a = 1.0f / sqrt_f(alpha2_tan2);
     return 0.5f * (erf_f(a) - 1.0f + exp_f(-a * a) * 0.56418958354f / a);
 }
@@ -69,7 +70,7 @@ LUCH_FN_SLOW float sample_beckmann_slope(float cot, float u) {
     for (int step = 0; step < 12; ++step) {
         x = erf_inverse_f(b);
         float excess = 1.0f + b + k * exp_f(-x * x) - target;
-        if (abs_f(excess) < 1e-6f * whole) break;
+        if (abs_f(excess) < BECKMANN_TOLERANCE * whole) break;
         if (excess > 0.0f) {
             high = b;
         } else {
@@ -85,7 +86,7 @@ LUCH_FN_SLOW Vec3 sample_visible_beckmann(Vec3 o, float alpha_x, float alpha_y, 
     Vec3 s = normalize(make_vec3(alpha_x * o.x, alpha_y * o.y, o.z));
     float sin_o = safe_sqrt(1.0f - s.z * s.z);
     float x, y;
-    if (sin_o < 1e-4f) {  // seen straight on: all slopes are equally visible
+    if (sin_o < BECKMANN_HEAD_ON_SINE) {  // seen straight on: all slopes are equally visible
         float r = sqrt_f(-log_f(max_f(1.0f - u.x, 1e-30f)));
         float sine, cosine;
         sincos_turns(u.y, &sine, &cosine);

@@ -8,6 +8,7 @@
 #include "luch/bsdf/microfacet.h"
 #include "luch/bsdf/sheen.h"
 #include "luch/bsdf/toon.h"
+#include "luch/math/bounds.h"
 #include "luch/plan.h"
 
 namespace luch {
@@ -171,7 +172,7 @@ LUCH_FN int choose_lobe(const ClosureSet& set, float weight_sum, float* u) {
         if (r < after) break;
         before = after;
     }
-    *u = clamp_f((r - before) / set.lobes[i].sample_weight, 0.0f, 0.99999994f);
+    *u = clamp_f((r - before) / set.lobes[i].sample_weight, 0.0f, BELOW_ONE);
     return i;
 }
 

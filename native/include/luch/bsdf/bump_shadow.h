@@ -4,6 +4,7 @@
 // Bump Terminator Problem".
 #pragma once
 #include "luch/bsdf/closure.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -18,7 +19,7 @@ LUCH_FN float bump_shadow(const Lobe& lobe, bool diffuse, Vec3 n_smooth, Vec3 wi
     if (!diffuse || !(lobe.flags & LOBE_SOFTENED)) return 1.0f;
     float cos_wi = abs_f(smooth_wi), cos_bump = abs_f(smooth_bump);
     if (cos_bump >= 1.0f || cos_wi >= 1.0f) return 1.0f;
-    if (cos_wi < 1e-6f) return 0.0f;
+    if (cos_wi < SMALLEST_COSINE) return 0.0f;
     float bump_alpha2 = saturate_f(0.125f * (1.0f / sqr(cos_bump) - 1.0f));
     float tan2 = max_f(1.0f / sqr(cos_wi) - 1.0f, 0.0f);
     float lambda = 0.5f * (sqrt_f(1.0f + bump_alpha2 * tan2) - 1.0f);  // Smith's for GGX

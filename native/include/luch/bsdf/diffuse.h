@@ -10,7 +10,7 @@ namespace luch {
 // of Oren-Nayar reflectance model"; the compensation of lost energy is OpenPBR's.
 LUCH_FN float oren_nayar_g(float cos_theta) {
     // The exact form divides by the cosine; its limit at the horizon is linear.
-    if (cos_theta < 1e-6f) return (HALF_PI - 2.0f / 3.0f) - cos_theta;
+    if (cos_theta < SMALLEST_COSINE) return (HALF_PI - 2.0f / 3.0f) - cos_theta;
     float sin_theta = safe_sqrt(1.0f - sqr(cos_theta));
     float theta = acos_f(cos_theta);
     return sin_theta * (theta - 2.0f / 3.0f - sin_theta * cos_theta) +

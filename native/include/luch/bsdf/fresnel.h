@@ -1,6 +1,7 @@
 // Fresnel reflectance: dielectrics, conductors, and the models artists steer (F82, remapped F0).
 // Cosines are of the angle to the microfacet normal, eta is the index behind it over the one before.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 
 namespace luch {
@@ -33,7 +34,7 @@ LUCH_FN float fresnel_dielectric(float cos_i, float eta, float* cos_t) {
 
 LUCH_FN float f0_from_ior(float ior) { return sqr((ior - 1.0f) / (ior + 1.0f)); }
 LUCH_FN float ior_from_f0(float f0) {
-    float root = sqrt_f(clamp_f(f0, 0.0f, 0.99f));
+    float root = sqrt_f(clamp_f(f0, 0.0f, MOST_F0));
     return (1.0f + root) / (1.0f - root);
 }
 

@@ -5,6 +5,7 @@
 #pragma once
 #include "luch/bsdf/fresnel.h"
 #include "luch/bsdf/lobe_value.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -72,9 +73,9 @@ struct Fibre {
 
 LUCH_FN void fibre_attenuation(const Lobe& l, float sin_o, float cos_o, Fibre* fibre) {
     float h = fibre_offset(l), cos_gamma_o = cosine_of_sine(h), gamma_o = asin_f(h);
-    float sin_gamma_t = clamp_f(h * cos_o / sqrt_f(max_f(sqr(l.ior) - sqr(sin_o), 1e-12f)), -1.0f, 1.0f);
+    float sin_gamma_t = clamp_f(h * cos_o / sqrt_f(max_f(sqr(l.ior) - sqr(sin_o), SMALLEST_FIBRE_ROOT)), -1.0f, 1.0f);
     float gamma_t = asin_f(sin_gamma_t), cos_t = cosine_of_sine(min_f(abs_f(sin_o) / l.ior, 1.0f));
-    float path = 2.0f * cosine_of_sine(sin_gamma_t) / max_f(cos_t, 1e-6f);
+    float path = 2.0f * cosine_of_sine(sin_gamma_t) / max_f(cos_t, SMALLEST_COSINE);
     Color through = {exp_f(-l.c0.x * path), exp_f(-l.c0.y * path), exp_f(-l.c0.z * path)};
     float ignored, f = fresnel_dielectric(cos_o * cos_gamma_o, l.ior, &ignored);
     const Color one = make_vec3(1.0f);
@@ -141,7 +142,7 @@ LUCH_FN_SLOW LobeSample sample_fibre(const Lobe& l, Vec3 wo, float u_lobe, Vec2 
     Fibre fibre = make_fibre(l, wo);
     int p = 0;
     for (; p < FIBRE_LOBES - 1 && !(u_lobe < fibre.share[p]); ++p) u_lobe -= fibre.share[p];
-    float left = clamp_f(safe_divide(u_lobe, fibre.share[p]), 1e-5f, 1.0f), v = fibre.variance[p];
+    float left = clamp_f(safe_divide(u_lobe, fibre.share[p]), LEAST_FIBRE_NUMBER, 1.0f), v = fibre.variance[p];
     float along = clamp_f(1.0f + v * log_f(left + (1.0f - left) * exp_f(-2.0f / v)), -1.0f, 1.0f);
     float sin_i = -along * fibre.tilted_sin[p] + cosine_of_sine(along) * cos_f(TWO_PI * u.y) * fibre.tilted_cos[p];
     sin_i = clamp_f(sin_i, -1.0f, 1.0f);

@@ -4,6 +4,7 @@
 // 2012, "Importance Sampling of Reflection from Hair Fibers".
 #pragma once
 #include "luch/bsdf/lobe_value.h"
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 #include "luch/sampling/warp.h"
 
@@ -15,7 +16,6 @@ struct HairFrame {
     float theta_o;  // from the plane across the fibre
     float first, range;  // of the Cauchy distribution along the fibre, as angles of its inverse
 };
-inline constexpr float GRAZING_FIBRE = 0.001f;  // radians from the fibre's own direction where nothing is reflected
 
 LUCH_FN HairFrame make_hair_frame(const Lobe& l, Vec3 wo) {
     HairFrame frame;
@@ -33,7 +33,8 @@ LUCH_FN HairFrame make_hair_frame(const Lobe& l, Vec3 wo) {
 LUCH_FN LobeValue hair_value(const Lobe& l, const HairFrame& frame, float theta_i, float phi) {
     if (HALF_PI - abs_f(theta_i) < GRAZING_FIBRE) return no_value();
     float from_cone = 0.5f * (theta_i + frame.theta_o) - l.extra;
-    float along = l.alpha_x / (2.0f * (sqr(from_cone) + sqr(l.alpha_x)) * frame.range * max_f(cos_f(theta_i), 1e-6f)),
+    float along = l.alpha_x /
+                  (2.0f * (sqr(from_cone) + sqr(l.alpha_x)) * frame.range * max_f(cos_f(theta_i), SMALLEST_COSINE)),
           around, around_pdf;
     if (l.type == LobeType::HAIR_REFLECTION) {
         if (abs_f(phi) > HALF_PI) return no_value();

@@ -9,6 +9,7 @@
 #pragma once
 #include "luch/bsdf/albedo.h"
 #include "luch/bsdf/thin_film.h"
+#include "luch/math/bounds.h"
 #include "luch/plan.h"
 
 namespace luch {
@@ -34,7 +35,7 @@ LUCH_FN float scale_film_f0(float f, float f0, float real_f0) {
 LUCH_FN Color remapped_dielectric(const Lobe& l, float cos_i, float* cos_t) {
     if (has_film(l)) {
         Color f = film_over_dielectric(l.thin_film_thickness, l.thin_film_ior, l.ior, cos_i, cos_t);
-        if (!(l.extra > 1e-5f) || (f.x == 1.0f && f.y == 1.0f && f.z == 1.0f)) return f;
+        if (!(l.extra > FILM_LEAST_F0) || (f.x == 1.0f && f.y == 1.0f && f.z == 1.0f)) return f;
         return {scale_film_f0(f.x, l.c0.x, l.extra), scale_film_f0(f.y, l.c0.y, l.extra),
                 scale_film_f0(f.z, l.c0.z, l.extra)};
     }

@@ -6,6 +6,7 @@
 #include "luch/bsdf/sheen.h"
 #include "luch/bsdf/subsurface.h"
 #include "luch/bsdf/thin_wall.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -60,7 +61,7 @@ LUCH_FN Color layer_sheen(ClosureSet& set, Color weight, const PrincipledSurface
 // The coat's colour is its absorption at normal incidence; a slanted way is longer by 1 / cos.
 LUCH_FN Color coat_absorption(Color tint, float ior, float amount, float cos_i) {
     float cos_t = safe_sqrt(1.0f - (1.0f - sqr(cos_i)) / sqr(ior));
-    float way = 1.0f / max_f(cos_t, 1e-6f);
+    float way = 1.0f / max_f(cos_t, SMALLEST_COSINE);
     Color through = {pow_f(tint.x, way), pow_f(tint.y, way), pow_f(tint.z, way)};
     return mix(make_vec3(1.0f), through, amount);
 }
@@ -68,7 +69,7 @@ LUCH_FN Color coat_absorption(Color tint, float ior, float amount, float cos_i) 
 LUCH_FN Color layer_coat(ClosureSet& set, Color weight, const PrincipledSurface& s) {
     float amount = max_f(s.p.coat_weight, 0.0f);
     if (!plan::COAT || !(amount > LOBE_WEIGHT_CUTOFF)) return weight;
-    float ior = clamp_f(s.p.coat_ior, 1.0f, 1e6f);
+    float ior = clamp_f(s.p.coat_ior, 1.0f, LARGEST_IOR);
     Vec3 n = specular_normal(s.coat_n, s.c);
     Lobe lobe;
     if (allows_reflective_caustics(s.c) && start_lobe(lobe, LobeType::MICROFACET_REFLECTION, amount * weight, n, s.c)) {

@@ -9,6 +9,7 @@
 #include "luch/bsdf/setup_specular.h"
 #include "luch/bsdf/sheen.h"
 #include "luch/bsdf/toon.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -64,7 +65,7 @@ LUCH_FN void setup_velvet(ClosureSet& set, Color weight, Color color, float roug
                           const SetupContext& c) {
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::ASHIKHMIN_SHEEN, weight * color, closure_normal(normal, c), c)) return;
-    lobe.extra = 1.0f / sqr(clamp_f(roughness, 0.01f, 1.0f));
+    lobe.extra = 1.0f / sqr(clamp_f(roughness, VELVET_MIN_ROUGHNESS, 1.0f));
     add_lobe(set, lobe, c);
 }
 

@@ -79,7 +79,7 @@ LUCH_FN Vec3 closure_normal(Vec3 normal, const SetupContext& c) { return normali
 // over ng in the plane of both: 4 a z^4 - 2 b z^2 + q = 0, from dot(reflect(wo, n'), ng) = threshold.
 LUCH_FN Vec3 lift_specular_normal(Vec3 normal, Vec3 ng, Vec3 wo) {
     float height = dot(wo, ng);
-    float threshold = min_f(0.9f * height, 0.01f);  // a ray may leave as flat as it came
+    float threshold = min_f(0.9f * height, LEAST_MIRROR_HEIGHT);  // a ray may leave as flat as it came
     if (dot(ng, reflect(wo, normal)) >= threshold) return normal;
     Vec3 side = normalize_or(normal - ng * dot(normal, ng), normal);
     float across = dot(wo, side);

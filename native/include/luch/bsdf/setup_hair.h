@@ -3,6 +3,7 @@
 #include "luch/bsdf/hair_fibre.h"
 #include "luch/bsdf/hair_lobes.h"
 #include "luch/bsdf/setup_context.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -39,7 +40,7 @@ LUCH_FN Color fibre_absorption(const PrincipledHairParams& p, float radial_rough
     if (p.parametrization == HairColor::ABSORPTION) return p.absorption;
     if (p.parametrization == HairColor::REFLECTANCE) return absorption_of_color(p.color, radial_roughness);
     float melanin = p.melanin * (1.0f + 2.0f * (p.random - 0.5f) * saturate_f(p.random_color));
-    melanin = -log_f(max_f(1.0f - melanin, 0.0001f));  // 0..1 looks linear
+    melanin = -log_f(max_f(1.0f - melanin, LIGHTEST_HAIR));  // 0..1 looks linear
     return absorption_of_pigments(melanin * (1.0f - p.melanin_redness), melanin * p.melanin_redness) +
            absorption_of_color(p.tint, radial_roughness);
 }
@@ -60,12 +61,12 @@ LUCH_FN_SLOW void setup_principled_hair(ClosureSet& set, Color weight, const Pri
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::HAIR_FIBRE, weight, c.n, c)) return;
     float random = 1.0f + 2.0f * (p.random - 0.5f) * p.random_roughness, radial = p.radial_roughness * random;
-    float roughness = clamp_f(p.roughness * random, 0.001f, 1.0f);
-    lobe.ior = clamp_f(p.ior, 1e-3f, 1e3f);
+    float roughness = clamp_f(p.roughness * random, FIBRE_MIN_ROUGHNESS, 1.0f);
+    lobe.ior = clamp_f(p.ior, FIBRE_SMALLEST_IOR, FIBRE_LARGEST_IOR);
     lobe.c0 = max_v(fibre_absorption(p, radial), make_vec3(0.0f));
     lobe.alpha_x = variance_along(roughness);
-    lobe.alpha_y = scale_around(clamp_f(radial, 0.001f, 1.0f));
-    float coat = variance_along(clamp_f((1.0f - saturate_f(p.coat)) * roughness, 0.001f, 1.0f));
+    lobe.alpha_y = scale_around(clamp_f(radial, FIBRE_MIN_ROUGHNESS, 1.0f));
+    float coat = variance_along(clamp_f((1.0f - saturate_f(p.coat)) * roughness, FIBRE_MIN_ROUGHNESS, 1.0f));
     lobe.tangent = surface.tangent;
     Vec3 t, b;
     make_frame(surface.tangent, &t, &b);
@@ -81,8 +82,8 @@ LUCH_FN_SLOW void setup_hair(ClosureSet& set, Color weight, bool transmission, f
     LobeType type = transmission ? LobeType::HAIR_TRANSMISSION : LobeType::HAIR_REFLECTION;
     if (!start_lobe(lobe, type, weight, specular_normal(c.n, c), c)) return;
     lobe.flags = 0;  // no bump reaches it
-    lobe.alpha_x = clamp_f(roughness_along, 0.001f, 1.0f);
-    lobe.alpha_y = clamp_f(roughness_around, 0.001f, 1.0f);
+    lobe.alpha_x = clamp_f(roughness_along, FIBRE_MIN_ROUGHNESS, 1.0f);
+    lobe.alpha_y = clamp_f(roughness_around, FIBRE_MIN_ROUGHNESS, 1.0f);
     lobe.extra = -offset;
     lobe.tangent = tangent;
     add_lobe(set, lobe, c);

@@ -3,11 +3,12 @@
 #include "luch/bsdf/ashikhmin_shirley.h"
 #include "luch/bsdf/params.h"
 #include "luch/bsdf/setup_context.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
-// Indices whose squares still fit a float with room for products; NaN: the smallest.
-LUCH_FN float valid_ior(float ior) { return clamp_f(ior, 1e-5f, 1e6f); }
+// NaN: the smallest.
+LUCH_FN float valid_ior(float ior) { return clamp_f(ior, SMALLEST_IOR, LARGEST_IOR); }
 
 // Puts back the light that one bounce between facets loses. mean_fresnel: mean reflectance of one
 // bounce over the hemisphere; the bounces beyond the first are tinted by it.
@@ -47,7 +48,7 @@ LUCH_FN bool set_tangent(Lobe& lobe, Vec3 tangent, Vec3 axis, float rotation) {
         tangent = tangent * c + cross(axis, tangent) * s + axis * (dot(axis, tangent) * (1.0f - c));
     }
     Vec3 b = cross(lobe.normal, tangent);
-    if (!(length_squared(b) > 1e-12f * length_squared(tangent)) || !finite_v(b)) return false;
+    if (!(length_squared(b) > TANGENT_SINE2 * length_squared(tangent)) || !finite_v(b)) return false;
     lobe.tangent = cross(normalize(b), lobe.normal);
     return true;
 }
@@ -73,9 +74,9 @@ LUCH_FN_SLOW void setup_glossy(ClosureSet& set, Color weight, const GlossyParams
     Lobe lobe;
     if (!start_lobe(lobe, LobeType::MICROFACET_REFLECTION, weight * p.color, specular_normal(n, c), c)) return;
     lobe.ior = 1.0f;
-    float alpha = sqr(saturate_f(p.roughness)), a = clamp_f(p.anisotropy, -0.99f, 0.99f);
+    float alpha = sqr(saturate_f(p.roughness)), a = clamp_f(p.anisotropy, -MOST_ANISOTROPY, MOST_ANISOTROPY);
     make_isotropic(lobe, alpha);
-    if (plan::ANISOTROPY && abs_f(a) > 1e-4f && !is_zero(p.tangent) &&
+    if (plan::ANISOTROPY && abs_f(a) > LEAST_ANISOTROPY && !is_zero(p.tangent) &&
         set_tangent(lobe, p.tangent, lobe.normal, p.rotation)) {
         float shrink = 1.0f - abs_f(a);
         set_roughness(lobe, a < 0.0f ? alpha / shrink : alpha * shrink, a < 0.0f ? alpha * shrink : alpha / shrink);

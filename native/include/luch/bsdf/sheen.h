@@ -4,6 +4,7 @@
 #include "luch/bsdf/albedo.h"
 #include "luch/bsdf/lobe_value.h"
 #include "luch/bsdf/sheen_table.h"
+#include "luch/math/bounds.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
@@ -12,18 +13,18 @@ namespace luch {
 // surface, and scales the weight by the albedo. False: these fibres reflect nothing here.
 LUCH_FN bool prepare_sheen(Lobe& lobe, Vec3 wo, float roughness) {
     Vec3 b = cross(lobe.normal, wo), t;
-    if (length_squared(b) > 1e-14f) {
+    if (length_squared(b) > SHEEN_HEAD_ON_SINE2) {
         t = cross(normalize(b), lobe.normal);
     } else {
         make_frame(lobe.normal, &t, &b);
     }
     lobe.tangent = t;
     TableSpot x = table_spot(dot(lobe.normal, wo), SHEEN_TABLE_SIZE);
-    TableSpot y = table_spot(clamp_f(roughness, 1e-3f, 1.0f), SHEEN_TABLE_SIZE);
+    TableSpot y = table_spot(clamp_f(roughness, SHEEN_MIN_ROUGHNESS, 1.0f), SHEEN_TABLE_SIZE);
     lobe.alpha_x = table_2d(SHEEN_A, x, y, SHEEN_TABLE_SIZE);
     lobe.alpha_y = table_2d(SHEEN_B, x, y, SHEEN_TABLE_SIZE);
     float albedo = table_2d(SHEEN_ALBEDO, x, y, SHEEN_TABLE_SIZE);
-    if (!(abs_f(lobe.alpha_x) >= 1e-5f) || !(albedo >= 1e-5f)) return false;
+    if (!(abs_f(lobe.alpha_x) >= SHEEN_LEAST) || !(albedo >= SHEEN_LEAST)) return false;
     lobe.weight *= albedo;
     lobe.sample_weight *= albedo;
     return true;
@@ -51,8 +52,8 @@ LUCH_FN LobeValue eval_velvet(const Lobe& lobe, Vec3 wo, Vec3 wi) {
     Vec3 h = normalize_or(wo + wi, lobe.normal);
     float cos_h = dot(lobe.normal, h), cos_ho = abs_f(dot(wo, h));
     const float pdf = 0.5f * INV_PI;
-    if (!(abs_f(cos_h) < 1.0f - 1e-5f && cos_ho > 1e-5f)) return no_value();  // no fibre lies there
-    float ratio = 2.0f * max_f(cos_h / cos_ho, 1e-5f);
+    if (!(abs_f(cos_h) < 1.0f - VELVET_LEAST && cos_ho > VELVET_LEAST)) return no_value();  // no fibre lies there
+    float ratio = 2.0f * max_f(cos_h / cos_ho, VELVET_LEAST);
     float sin2 = 1.0f - sqr(cos_h);
     float density = exp_f(-sqr(cos_h) / sin2 * lobe.extra) * lobe.extra * INV_PI / sqr(sin2);
     float masking = min_f(1.0f, ratio * min_f(cos_o, cos_i));

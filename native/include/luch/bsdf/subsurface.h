@@ -8,16 +8,9 @@
 
 namespace luch {
 
-// A mean free path must also be this many units in the last place of the point's position (as seen from the camera):
-// walks begin inside the surface by its error bound, about 20 of them, and would lose themselves in rounding. Shorter
-// ones are a sixtieth of a pixel and less in a picture of 1,000.
-inline constexpr float SUBSURFACE_MIN_ULP = 256.0f;
 // The profile of Christensen and Burley, and the walk of old, take the radius for a diffusion length; this makes both
 // look alike.
 inline constexpr float SUBSURFACE_RADIUS_SCALE = 0.0795774715459477f;  // 1 / (4 pi)
-// Longest and shortest interface; the phase function's anisotropy where it is no delta yet.
-inline constexpr float SUBSURFACE_MIN_IOR = 1.01f, SUBSURFACE_MAX_IOR = 3.8f;
-inline constexpr float SUBSURFACE_MAX_ANISOTROPY = 0.99f, SUBSURFACE_MAX_ANISOTROPY_FIT = 0.9f;
 
 LUCH_FN LobeType subsurface_lobe(SubsurfaceMethod method) {
     switch (method) {
@@ -54,8 +47,8 @@ LUCH_FN float skin_radius_factor(float color, float boundary) {
         low = darker ? middle : low;
         high = darker ? high : middle;
     }
-    if (color < 1e-4f) middle = 0.0f;
-    if (color >= 0.995f) middle = 0.999999f;
+    if (color < SKIN_DARKEST) middle = 0.0f;
+    if (color >= SKIN_BRIGHTEST) middle = MEDIUM_MAX_ALBEDO;
     return sqrt_f(3.0f * (1.0f - middle));
 }
 

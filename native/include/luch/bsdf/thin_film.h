@@ -6,10 +6,9 @@
 #include "luch/bsdf/closure.h"
 #include "luch/bsdf/film_table.h"
 #include "luch/bsdf/fresnel.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
-
-inline constexpr float FILM_MIN_THICKNESS_NM = 0.1f;  // thinner films are no films
 
 struct Complex {
     float re, im;
@@ -114,7 +113,7 @@ LUCH_FN_SLOW Color film_over_metal(float thickness_nm, float film_ior, Vec3 n, V
 // n and k of an F82 metal: F0 and the value at 82 degrees read as reflectance and edge tint.
 // Source: Gulbrandsen 2014, "Artist Friendly Metallic Fresnel".
 LUCH_FN float film_over_f82(const FilmPath& f, int channel, float f0, float b) {
-    float r = min_f(f0, 0.999f);
+    float r = min_f(f0, FILM_MOST_F0);
     float edge = fresnel_f82(F82_COSINE, f0, b);
     float root = sqrt_f(r);
     float n = mix_f((1.0f + root) / (1.0f - root), (1.0f - r) / (1.0f + r), edge);

@@ -1,13 +1,14 @@
 // Light in a cone with a soft rim: around the normal (diffuse) or the mirrored view (glossy).
 #pragma once
 #include "luch/bsdf/lobe_value.h"
+#include "luch/math/bounds.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
 
 // alpha_x: half angle of full brightness; alpha_y: width of the rim; extra: 1 - cos of both together.
 LUCH_FN void prepare_toon(Lobe& lobe, float size, float smooth) {
-    lobe.alpha_x = clamp_f(size, 1e-5f, 1.0f) * HALF_PI;
+    lobe.alpha_x = clamp_f(size, TOON_LEAST_SIZE, 1.0f) * HALF_PI;
     lobe.alpha_y = saturate_f(smooth) * HALF_PI;
     float half = 0.5f * min_f(lobe.alpha_x + lobe.alpha_y, HALF_PI);
     lobe.extra = 2.0f * sqr(sin_f(half));  // 1 - cos, which would round to 0 for thin cones

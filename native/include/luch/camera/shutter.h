@@ -35,7 +35,7 @@ LUCH_FN float shutter_time(const ShutterView& shutter, float u, u32 line, u32 li
 // The camera at a time. What its rays need: to_camera stays that of the shutter's middle, which passes are told in.
 LUCH_FN_SLOW CameraView camera_at_time(const CameraView& camera, const ShutterView& shutter, float time) {
     CameraView moved = camera;
-    if (shutter.camera_keys != 0u) moved.to_world = transform_at(shutter.camera, {0u, shutter.camera_keys}, time);
+    if (shutter.camera_keys != 0u) moved.to_world = transform_at(shutter.camera, {0u, shutter.camera_keys, 0u}, time);
     if (shutter.zooms) {
         // The place in the image plane is blended, from the end that is nearer to the middle, as in Cycles.
         u32 end = time < 0.5f ? 0u : 1u;

@@ -23,7 +23,8 @@ LUCH_FN void extend(Box& box, const Box& other) {
 // A triangle's box as the slab test needs it: math/bounds.h, 1.
 LUCH_FN Box triangle_box(Vec3 p0, Vec3 p1, Vec3 p2) {
     Vec3 lo = min_v(min_v(p0, p1), p2), hi = max_v(max_v(p0, p1), p2);
-    float error = SHEAR_ERROR * max_component(hi - lo) + 1e-44f;  // denormal: above() cannot widen such numbers
+    float error =
+        SHEAR_ERROR * max_component(hi - lo) + DENORMAL_MARGIN;  // denormal: above() cannot widen such numbers
     return {{below(lo.x - error), below(lo.y - error), below(lo.z - error)},
             {above(hi.x + error), above(hi.y + error), above(hi.z + error)}};
 }

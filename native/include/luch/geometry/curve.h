@@ -6,6 +6,7 @@
 #include "luch/geometry/motion.h"
 #include "luch/geometry/precision.h"
 #include "luch/geometry/ray.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -117,9 +118,9 @@ LUCH_FN Capsule widened(Capsule c, const CurveSegment& s) {
         size = max_f(size, max_component(abs_v(s.k[i].p - s.k[1].p)));
         place = max_f(place, max_component(abs_v(s.k[i].p)));
     }
-    float error =
-        64.0f * EPS * (size + c.radius) + 16.0f * EPS * place + (THICK_TOLERANCE + PLANE_TOLERANCE) * c.radius;
-    c.radius = above(c.radius + error) + 1e-43f;
+    float error = CURVE_SIZE_ERROR * (size + c.radius) + CURVE_PLACE_ERROR * place +
+                  (THICK_TOLERANCE + PLANE_TOLERANCE) * c.radius;
+    c.radius = above(c.radius + error) + DENORMAL_SLACK;
     return c;
 }
 LUCH_FN float distance_to_line(Vec3 p, Vec3 a, Vec3 b) {

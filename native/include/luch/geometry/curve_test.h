@@ -4,13 +4,9 @@
 #pragma once
 #include "luch/geometry/curve.h"
 #include "luch/geometry/triangle.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
-
-// A ribbon turns to each ray anew, so one that leaves it would meet it again. It is not met nearer than this many radii
-// from a ray's start (Cycles has the same rule), nor at all by a ray that starts within it, were it round: so far from its
-// axis, in radii.
-inline constexpr float RIBBON_START_RADII = 2.0f, RIBBON_WITHIN_RADII = 1.05f;
 
 template <Precision P>
 struct CurveNumber {
@@ -79,7 +75,7 @@ LUCH_FN float turn(Vec2 p, Vec2 q) { return p.x * q.y - p.y * q.x; }
 // taken where the tangent looks along the ray.
 LUCH_FN Vec2 ribbon_side(Vec3 tangent, Vec3 chord, float radius) {
     float length2 = tangent.x * tangent.x + tangent.y * tangent.y;
-    if (!(length2 > sqr(4.0f * EPS) * tangent.z * tangent.z)) {
+    if (!(length2 > sqr(RIBBON_ALONG_SINE) * tangent.z * tangent.z)) {
         tangent = chord;
         length2 = tangent.x * tangent.x + tangent.y * tangent.y;
     }
@@ -198,7 +194,7 @@ LUCH_FN bool intersect_thick(const CurveSegment& segment, PieceRange range, cons
     Vec3 a = place_of(r.s, from), b = place_of(r.s, to), chord = b - a;
     float flat2 = chord.x * chord.x + chord.y * chord.y, length2 = flat2 + chord.z * chord.z;
     // Along the curve: it would be entered through an end, which is open.
-    if (!(flat2 > 1e-10f * length2)) return false;
+    if (!(flat2 > CURVE_ALONG_SINE2 * length2)) return false;
     float share = -(a.x * chord.x + a.y * chord.y) / flat2;  // of the chord, where the two lines are nearest
     float middle = a.z + share * chord.z, width = range.to - range.from;
     // Here the ray is as near to the axis as it comes; without the ends, which may cut that off.
@@ -207,7 +203,7 @@ LUCH_FN bool intersect_thick(const CurveSegment& segment, PieceRange range, cons
     // A bent curve is nearest elsewhere: look once more where its own tangent says.
     Vec3 at = place_of(r.s, curve_weights(in.u)), tangent = place_of(r.s, tangent_weights(in.u));
     float flat = tangent.x * tangent.x + tangent.y * tangent.y;
-    if (flat > 1e-10f * (flat + tangent.z * tangent.z)) {
+    if (flat > CURVE_ALONG_SINE2 * (flat + tangent.z * tangent.z)) {
         float nearer = at.z - (at.x * tangent.x + at.y * tangent.y) / flat * tangent.z;
         CurveDistance second = distance_to_curve(r.s, nearer, in.u);
         if (second.distance < in.distance) {
@@ -294,9 +290,7 @@ LUCH_FN bool intersect_piece(const CurveSet& set, u32 piece, const CurveRay<F>& 
     return intersect_piece_of(segment_of_piece(set, piece), set, piece, ray, t_min, t_max, hit);
 }
 
-// Whether the ray's line comes near a capsule at all; never false where intersect_piece hits. As for spheres
-// (cpu/accel/sphere_blocks.h), rounding strays by some EPS of the distance from the ray's origin.
-inline constexpr float CAPSULE_SLACK = 64.0f * EPS;
+// Whether the ray's line comes near a capsule at all; never false where intersect_piece hits.
 LUCH_FN bool line_may_touch(const Capsule& c, Vec3 origin, Vec3 direction) {
     Vec3 f = c.a - origin, e = c.b - c.a;
     float inverse = 1.0f / dot(direction, direction);
@@ -304,8 +298,8 @@ LUCH_FN bool line_may_touch(const Capsule& c, Vec3 origin, Vec3 direction) {
     float w = clamp_f(safe_divide(-dot(p, q), dot(q, q)), 0.0f, 1.0f);
     Vec3 nearest = p + q * w;
     float size = abs_f(f.x) + abs_f(f.y) + abs_f(f.z) + abs_f(e.x) + abs_f(e.y) + abs_f(e.z);
-    float limit = c.radius + CAPSULE_SLACK * size;
-    return !(dot(nearest, nearest) > limit * limit + 1e-43f);  // NaN: the test decides
+    float limit = c.radius + LINE_SLACK * size;
+    return !(dot(nearest, nearest) > limit * limit + DENORMAL_SLACK);  // NaN: the test decides
 }
 
 }  // namespace luch

@@ -50,6 +50,15 @@ LUCH_FN Vec3 entered_at(const Sphere& sphere, Vec3 origin, Vec3 direction) {
     return normalize_or(n, -normalize(direction));
 }
 
+// Across the triangle, twice its area long. Of the two shorter sides: the product of a sliver's long ones cancels, and
+// errs by EPS times their length over the short one's, while nothing tells to which side such a normal points.
+LUCH_FN Vec3 area_normal(const Triangle& t) {
+    Vec3 a = t.p[1] - t.p[0], b = t.p[2] - t.p[1], c = t.p[0] - t.p[2];
+    float aa = dot(a, a), bb = dot(b, b), cc = dot(c, c);
+    if (aa >= max_f(bb, cc)) return cross(b, c);
+    return bb >= cc ? cross(c, a) : cross(a, b);
+}
+
 // Of a triangle as rays are tested with it: the point (1 - u - v) p0 + u p1 + v p2, its error, and how far the corners
 // are from it at most.
 struct TrianglePoint {

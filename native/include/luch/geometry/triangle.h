@@ -64,8 +64,8 @@ LUCH_FN bool triangle_can_be_traced(Vec3 p0, Vec3 p1, Vec3 p2) {
 LUCH_FN bool ray_is_valid(const Ray& ray) {
     Vec3 a = abs_v(ray.direction);
     float largest = max_component(a);
-    return finite_v(ray.origin) && finite_v(ray.direction) && largest >= 1e-37f && largest <= 1e37f &&
-           ray.t_max > 0.0f && ray.t_min < ray.t_max;
+    return finite_v(ray.origin) && finite_v(ray.direction) && largest >= SMALLEST_DIRECTION &&
+           largest <= LARGEST_DIRECTION && ray.t_max > 0.0f && ray.t_min < ray.t_max;
 }
 
 // Hits lie in (t_min, t_max]; t_min >= 0, t_max <= the largest float.

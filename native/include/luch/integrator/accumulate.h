@@ -2,6 +2,7 @@
 #pragma once
 #include "luch/bsdf/bsdf.h"
 #include "luch/integrator/render_view.h"
+#include "luch/math/bounds.h"
 #include "luch/shade/surface_setup.h"
 #include "luch/shade/uv.h"
 
@@ -209,7 +210,7 @@ LUCH_FN_SLOW void write_features(const RenderView& scene, FilmWriter& writer, Pa
         film_add(writer, path.pixel, layout.denoising_albedo, path.feature_throughput * rough_albedo * write);
     }
     path.feature_throughput *= sharp_albedo * (1.0f - write) + set.transparent;
-    if (!(max_component(path.feature_throughput) > 1e-4f)) path.flags &= ~u32(PATH_FEATURES);
+    if (!(max_component(path.feature_throughput) > FEATURE_CUTOFF)) path.flags &= ~u32(PATH_FEATURES);
 }
 
 }  // namespace luch

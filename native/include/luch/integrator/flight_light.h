@@ -3,6 +3,7 @@
 // heuristic; then a light for that point, as for a surface's.
 #pragma once
 #include "luch/integrator/flight.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -35,7 +36,7 @@ LUCH_FN float sample_flight_density(const FlightDensity& d, float reach, float u
     float x = extinction * reach;
     // In thin media the logarithm would lose all digits; the inverse to first order leaves a relative error of
     // x^2 / 12.
-    if (!(x > 1e-3f)) return reach * u * (1.0f - 0.5f * x * (1.0f - u));
+    if (!(x > THIN_FLIGHT)) return reach * u * (1.0f - 0.5f * x * (1.0f - u));
     float covered = finite_f(x) ? 1.0f - exp_f(-x) : 1.0f;
     return min_f(-log_f(1.0f - u * covered) / extinction, reach);
 }
@@ -45,15 +46,14 @@ struct Equiangular {
     float foot, height;  // of the light's perpendicular on the ray: where, and how long
     float from, to;  // angles of both ends
 };
-// Nothing is sampled farther from the foot than so many heights; and the angle of that.
-inline constexpr float EQUIANGULAR_REACH = 1e4f, EQUIANGULAR_STEEPEST = 1.57069633f;
 
 LUCH_FN Equiangular make_equiangular(const Ray& ray, float reach, Vec3 pivot) {
     Vec3 to_pivot = pivot - ray.origin;
     Equiangular e;
     e.foot = dot(to_pivot, ray.direction);
     // A light on the ray itself: any height gives a density, one that is not 0 gives one without poles.
-    e.height = max_f(length(to_pivot - ray.direction * e.foot), 1e-4f * max_f(abs_f(e.foot), 1e-6f));
+    e.height = max_f(length(to_pivot - ray.direction * e.foot),
+                     EQUIANGULAR_LEAST_HEIGHT * max_f(abs_f(e.foot), EQUIANGULAR_LEAST_FOOT));
     e.from = max_f(atan2_f(-e.foot, e.height), -EQUIANGULAR_STEEPEST);
     e.to = min_f(finite_f(reach) ? atan2_f(reach - e.foot, e.height) : HALF_PI, EQUIANGULAR_STEEPEST);
     return e;

@@ -4,6 +4,7 @@
 #pragma once
 #include "luch/bsdf/phase.h"
 #include "luch/geometry/surface.h"
+#include "luch/math/bounds.h"
 #include "luch/shade/surface_setup.h"
 
 namespace luch {
@@ -83,7 +84,7 @@ LUCH_FN Color media_transmittance(const MediaView& media, const MediumStack& sta
 // cancellation of small x by their series (the next term is below 1e-8 of the sum), and 0 where it would be endless.
 LUCH_FN float transmitted_length(float coefficient, float distance) {
     float x = coefficient * distance;
-    if (!(x > 1e-2f)) {
+    if (!(x > SERIES_BELOW)) {
         if (!finite_f(distance)) return 0.0f;
         return distance * (1.0f - x * (0.5f - x * (1.0f / 6.0f - x * (1.0f / 24.0f))));
     }

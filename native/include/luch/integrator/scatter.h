@@ -4,6 +4,7 @@
 #include "luch/geometry/surface.h"
 #include "luch/integrator/accumulate.h"
 #include "luch/light/sample.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -144,7 +145,7 @@ LUCH_FN bool scatter(const RenderView& scene, FilmWriter& writer, PathState& pat
         *next = ray_from(spawn, ng, incoming);
         return true;
     }
-    u_lobe = min_f((u_lobe - through_probability) / (1.0f - through_probability), 0.99999994f);
+    u_lobe = min_f((u_lobe - through_probability) / (1.0f - through_probability), BELOW_ONE);
     BsdfSample s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
     if (!(s.pdf_sa > 0.0f) || is_zero(s.throughput)) return false;
     if (!finite_v(s.throughput)) {

@@ -5,12 +5,12 @@
 #include "luch/bsdf/setup_context.h"
 #include "luch/integrator/scatter.h"
 #include "luch/integrator/subsurface_medium.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
-// What is still inside after so many steps, or is weaker than this, is dropped (as in Cycles).
+// What is still inside after so many steps is dropped (as in Cycles).
 inline constexpr u32 WALK_STEPS = 256;
-inline constexpr float WALK_CUTOFF = 1e-6f;
 // From this step on directions are forgotten: isotropic scattering of the same reduced coefficients (the similarity
 // relation of Wyman, Patterson and Wilson 1989), which guides well.
 inline constexpr u32 WALK_ISOTROPIC_FROM = 10;
@@ -51,7 +51,7 @@ LUCH_FN int chosen_subsurface(const ClosureSet& set, float u_lobe) {
     float through = average(set.transparent), lobes = lobe_weight_sum(set);
     float through_probability = through / (through + lobes);
     if (u_lobe < through_probability) return -1;
-    u_lobe = min_f((u_lobe - through_probability) / (1.0f - through_probability), 0.99999994f);
+    u_lobe = min_f((u_lobe - through_probability) / (1.0f - through_probability), BELOW_ONE);
     int chosen = set.count > 1 ? choose_lobe(set, lobes, &u_lobe) : 0;
     return is_subsurface(set.lobes[chosen].type) ? chosen : -1;
 }
@@ -72,7 +72,7 @@ LUCH_FN bool refract_inside(const Lobe& lobe, Vec3 wo, Vec2 u, Vec3* inside) {
     Vec3 local = sample_visible_ggx(lobe, {dot(t, wo), dot(b, wo), cos_wo}, 1.0f, u);
     Vec3 facet = to_world(local, t, b, lobe.normal);
     float eta = 1.0f / lobe.ior, cos_facet = dot(facet, wo);
-    float cos_inside = sqrt_f(max_f(1.0f - sqr(eta) * (1.0f - sqr(cos_facet)), 1e-14f));
+    float cos_inside = sqrt_f(max_f(1.0f - sqr(eta) * (1.0f - sqr(cos_facet)), ENTRY_COSINE2));
     *inside = normalize(-(eta * wo) + (eta * cos_facet - cos_inside) * facet);
     return true;
 }

@@ -3,11 +3,10 @@
 // profiles for efficient subsurface scattering"; King, Kulla, Conty and Fajardo 2013, "BSSRDF importance sampling".
 #pragma once
 #include "luch/integrator/subsurface.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
-// Profiles end at so many of their lengths; what lies within.
-inline constexpr float PROFILE_REACH = 16.0f, PROFILE_SHARE = 0.9963790093708328f;
 // Surfaces that a probe looks at; a folded mesh may have more within reach, which are left out.
 inline constexpr u32 PROBE_HITS = 16;
 
@@ -39,7 +38,7 @@ LUCH_FN float sample_radius(Vec3 length, float u, float* reach) {
         if (scaled < 1.0f) break;
         scaled -= 1.0f;
     }
-    float r = sample_profile(min_f(scaled, 0.99999994f)) * chosen;
+    float r = sample_profile(min_f(scaled, BELOW_ONE)) * chosen;
     *reach = safe_sqrt(sqr(PROFILE_REACH * chosen) - sqr(r));
     return r;
 }
@@ -57,7 +56,7 @@ LUCH_FN ProbeAxes choose_axes(Vec3 n, float* u) {
         return {n, t, b, 0.5f, 0.25f, 0.25f};
     }
     bool first = *u < 0.75f;
-    *u = min_f((*u - (first ? 0.5f : 0.75f)) * 4.0f, 0.99999994f);
+    *u = min_f((*u - (first ? 0.5f : 0.75f)) * 4.0f, BELOW_ONE);
     if (first) return {t, n, b, 0.25f, 0.5f, 0.25f};
     return {b, t, n, 0.25f, 0.25f, 0.5f};
 }
@@ -112,7 +111,7 @@ LUCH_FN void probe_disk(const SceneView& scene, SubsurfaceWalk& walk, Tracer& tr
             walk.direction = normal;
             kept = weight * (1.0f / mean);
         } else {
-            choice = min_f((choice - take) / (1.0f - take), 0.99999994f);
+            choice = min_f((choice - take) / (1.0f - take), BELOW_ONE);
         }
         ray.t_min = bits_float(float_bits(max_f(hit.t, 1e-30f)) + 1u);
         if (!(ray.t_min < ray.t_max)) break;

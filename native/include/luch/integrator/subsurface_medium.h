@@ -1,17 +1,12 @@
 // The medium under a surface: coefficients that give back the colour that was asked for, and the phase functions that
 // a walk in it draws from.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/math/fn.h"
 #include "luch/math/vec.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
-
-// Walks never end in a medium that absorbs nothing.
-inline constexpr float MEDIUM_MAX_ALBEDO = 0.999999f;
-// Below this single-scattering albedo light hardly comes back and guiding has nothing to go by: the walk is that of
-// this albedo, darkened in proportion (as Cycles does; the colour is below 0.03 there).
-inline constexpr float MEDIUM_MIN_ALBEDO = 0.2f;
 
 struct Medium {
     Color extinction;  // per metre
@@ -63,7 +58,9 @@ LUCH_FN float channel_albedo(float color, float g, bool fitted, float* light) {
     return max_f(albedo, MEDIUM_MIN_ALBEDO);
 }
 
-LUCH_FN float channel_extinction(float mean_free_path, float scale) { return scale / max_f(mean_free_path, 1e-16f); }
+LUCH_FN float channel_extinction(float mean_free_path, float scale) {
+    return scale / max_f(mean_free_path, SMALLEST_FREE_PATH);
+}
 
 // older: the mapping of Blender's older methods, whose radius is that of isotropic scattering.
 // *light: changed where the albedo has to be.
@@ -79,13 +76,13 @@ LUCH_FN Medium medium_of(Color color, Vec3 radius, float g, bool older, Color* l
 
 // Density of the phase function, per steradian; cosine: between the directions of flight before and after.
 LUCH_FN float henyey_greenstein(float cosine, float g) {
-    if (abs_f(g) < 1e-3f) return 0.25f * INV_PI;
+    if (abs_f(g) < ISOTROPIC_BELOW) return 0.25f * INV_PI;
     float k = 1.0f + sqr(g) - 2.0f * g * cosine;
     return 0.25f * INV_PI * (1.0f - sqr(g)) / max_f(k * sqrt_f(k), 1e-20f);
 }
 // A cosine of that density. u in [0, 1).
 LUCH_FN float sample_henyey_greenstein(float g, float u) {
-    if (abs_f(g) < 1e-3f) return 1.0f - 2.0f * u;
+    if (abs_f(g) < ISOTROPIC_BELOW) return 1.0f - 2.0f * u;
     float k = (1.0f - sqr(g)) / (1.0f - g + 2.0f * g * u);
     return clamp_f((1.0f + sqr(g) - sqr(k)) / (2.0f * g), -1.0f, 1.0f);
 }
@@ -98,7 +95,7 @@ struct Guide {
 };
 LUCH_FN Guide guide_of(float albedo) {
     float power = pow_f(albedo, 2.44294f - 0.0215813f * albedo + 0.578637f / albedo);
-    float length = 1.0f / sqrt_f(max_f(1.0f - power, 1e-7f));
+    float length = 1.0f / sqrt_f(max_f(1.0f - power, LEAST_DIFFUSION));
     return {length, log_f((length + 1.0f) / (length - 1.0f))};
 }
 // Density per steradian around the normal (Meng, Hanika and Dachsbacher 2016, equations 9 and 10).

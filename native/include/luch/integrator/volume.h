@@ -5,6 +5,7 @@
 // divides by the mean of all channels' densities (spectral multiple importance sampling), so that colours do not fight.
 #pragma once
 #include "luch/integrator/flight_light.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -100,7 +101,7 @@ LUCH_FN_SLOW FlightEnd fly(const RenderView& scene, FilmWriter& writer, PathStat
     Vec2 u = sample_2d(path.sampler, path.dimension + FLIGHT_DISTANCE);
     float chance = turning_chance(scene, path), chosen = pick_channel(flight.carried, extinction, u.y);
     bool free = u.x < chance && chosen > 0.0f;
-    float t = free ? -log_f(1.0f - min_f(u.x / chance, 0.99999994f)) / chosen : INFINITE_DISTANCE;
+    float t = free ? -log_f(1.0f - min_f(u.x / chance, BELOW_ONE)) / chosen : INFINITE_DISTANCE;
     FlightEnd end;
     if (t < flight.length) {
         Color through = transmitted(extinction, t);

@@ -1,6 +1,7 @@
 // Lamps of finite size as rays see them: a wide tree of boxes over them, tested sixteen at a time.
 #pragma once
 #include "luch/light/lamp.h"
+#include "luch/math/bounds.h"
 
 namespace luch {
 
@@ -23,7 +24,7 @@ LUCH_FN u32 hit_lamp_boxes(const LampBoxNode& node, Vec3 origin, Vec3 inverse, f
         float az = (node.low_z[i] - origin.z) * inverse.z, bz = (node.high_z[i] - origin.z) * inverse.z;
         float near = max_f(max_f(min_f(ax, bx), min_f(ay, by)), max_f(min_f(az, bz), 0.0f));
         float far = min_f(min_f(max_f(ax, bx), max_f(ay, by)), min_f(max_f(az, bz), t_max));
-        hit[i] = near <= far * 1.0000004f && node.low_x[i] <= node.high_x[i] ? 1 : 0;
+        hit[i] = near <= far * LAMP_SLAB_UP && node.low_x[i] <= node.high_x[i] ? 1 : 0;
     }
     u32 mask = 0;
     for (int i = 0; i < LAMP_BOX_WIDTH; ++i) mask |= static_cast<u32>(hit[i]) << i;

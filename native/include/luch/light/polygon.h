@@ -146,12 +146,12 @@ LUCH_FN_SLOW Vec2 sample_rectangle_cone(const RectangleCone& r, Vec2 u) {
     float fu = sin_au != 0.0f ? (cos_f(au) * r.b0 + r.b1) / sin_au : 1e30f;
     float cu = copysign_f(1.0f / sqrt_f(fu * fu + r.b0 * r.b0), fu);
     cu = clamp_f(cu, -1.0f, 1.0f);
-    float x = clamp_f(cu * r.height / max_f(safe_sqrt(1.0f - cu * cu), 1e-7f), r.x0, r.x1);
+    float x = clamp_f(cu * r.height / max_f(safe_sqrt(1.0f - cu * cu), RECTANGLE_LEAST_SINE), r.x0, r.x1);
     float d2 = x * x + r.height * r.height;
     float h0 = r.y0 / sqrt_f(d2 + r.y0 * r.y0), h1 = r.y1 / sqrt_f(d2 + r.y1 * r.y1);
     float h = mix_f(h0, h1, u.y);
     float rest = 1.0f - h * h;
-    float y = rest > 1e-6f ? h * sqrt_f(d2 / rest) : (h > 0.0f ? r.y1 : r.y0);
+    float y = rest > RECTANGLE_LEAST_REST ? h * sqrt_f(d2 / rest) : (h > 0.0f ? r.y1 : r.y0);
     return {x, clamp_f(y, r.y0, r.y1)};
 }
 

@@ -9,6 +9,7 @@
 #include "luch/light/tree.h"
 #include "luch/light/triangle.h"
 #include "luch/light/world.h"
+#include "luch/math/bounds.h"
 #include "luch/plan.h"
 
 namespace luch {
@@ -210,7 +211,7 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
     if (!(shares.local + shares.suns + shares.world > 0.0f)) return no_light_sample();
     constexpr bool local_lights = plan::LAMPS || plan::EMISSIVE_MESHES;
     if (local_lights && u_select < shares.local) {
-        EmitterChoice choice = choose_local(lights, q, &shares, min_f(u_select / shares.local, 0.99999994f), u);
+        EmitterChoice choice = choose_local(lights, q, &shares, min_f(u_select / shares.local, BELOW_ONE), u);
         if (choice.emitter == NONE) return no_light_sample();
         const Emitter& emitter = lights.emitters[choice.emitter];
         float probability = choice.probability * shares.local;
@@ -221,7 +222,7 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
     u_select -= shares.local;
     // The last group takes what rounding leaves over.
     if (plan::SUNS && shares.suns > 0.0f && (u_select < shares.suns || !(shares.world > 0.0f))) {
-        EmitterChoice choice = choose_sun(lights, q, min_f(u_select / shares.suns, 0.99999994f));
+        EmitterChoice choice = choose_sun(lights, q, min_f(u_select / shares.suns, BELOW_ONE));
         if (choice.emitter == NONE) return no_light_sample();
         return sample_chosen_lamp(lights, lights.suns[choice.emitter], q, choice.probability * shares.suns, u);
     }

@@ -5,6 +5,7 @@
 // tree splitting".
 #pragma once
 #include "luch/light/light.h"
+#include "luch/math/bounds.h"
 #include "luch/sampling/hash.h"
 
 namespace luch {
@@ -70,8 +71,8 @@ LUCH_FN float child_importance(const LightTreeNode& node, int i, const LightQuer
     float best_i = cos_i * cos_u + sin_i * sin_u;
     best_i = cos_i >= cos_u ? 1.0f : best_i;
     float worst_i = d2 > r2 ? cos_i * cos_u - sin_i * sin_u : 0.0f;
-    float receive = 0.5f * (max_f(best_i, 0.02f) + max_f(worst_i, 0.0f));
-    float above = facing + reach_up + q.always_above + 1e-5f * (abs_f(facing) + reach_up);
+    float receive = 0.5f * (max_f(best_i, LIGHT_LEAST_COSINE) + max_f(worst_i, 0.0f));
+    float above = facing + reach_up + q.always_above + LIGHT_FACING_SLACK * (abs_f(facing) + reach_up);
     receive = above > 0.0f ? max_f(receive, q.least_received) : 0.0f;
 
     // Sending side: nothing if the smallest angle between any normal and any direction to the point is beyond reach.
@@ -84,10 +85,10 @@ LUCH_FN float child_importance(const LightTreeNode& node, int i, const LightQuer
     // sphere of normals has, 1/4 in the root, scaled by their spread and by the ball's width). Bounds alone give
     // an emitter's silhouette as much as its middle: relative variance 0.45 against 0.02 on a ball of triangles.
     float cos_m = -(node.mean_x[i] * dx + node.mean_y[i] * dy + node.mean_z[i] * dz) * inverse_d * max_f(cos_u, 0.0f);
-    float root = sqrt_f(cos_m * cos_m + 0.25f * (node.spread[i] + sin_u * sin_u) + 1e-4f);
+    float root = sqrt_f(cos_m * cos_m + 0.25f * (node.spread[i] + sin_u * sin_u) + LIGHT_LEAST_VARIANCE);
     float send = 0.5f * (root + max_f(cos_m, -node.fold[i] * root));
     send = mix_f(send, 1.0f, node.omni[i]);
-    send = near_cos > node.cos_reach[i] - 1e-4f ? send : 0.0f;
+    send = near_cos > node.cos_reach[i] - LIGHT_REACH_SLACK ? send : 0.0f;
 
     // Within the ball an emitter may be anywhere: its mean share is that of some radius, not of the centre.
     return node.intensity[i] * receive * send / max_f(max_f(d2, 0.25f * r2), 1e-20f);
@@ -116,7 +117,7 @@ LUCH_FN int choose_child(const float* importance, float sum, float* u) {
         running += importance[i];
         if (target < running) break;
     }
-    *u = clamp_f((target - before) / importance[chosen], 0.0f, 0.99999994f);
+    *u = clamp_f((target - before) / importance[chosen], 0.0f, BELOW_ONE);
     return chosen;
 }
 

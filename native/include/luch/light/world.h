@@ -6,6 +6,7 @@
 // pi - 2 pi (x + 1/2) / W, latitude pi ((y + 1/2) / H - 1/2).
 #pragma once
 #include "luch/light/light.h"
+#include "luch/math/bounds.h"
 #include "luch/sampling/warp.h"
 
 namespace luch {
@@ -106,7 +107,7 @@ LUCH_FN float world_sun_irradiance(const WorldLight& w, Vec3 n, bool transmits) 
 // The sun's share of the samples. The even part of the sky is found by rays.
 LUCH_FN float world_sun_probability(const WorldLight& w, Vec3 n, bool transmits) {
     float sun = world_sun_irradiance(w, n, transmits);
-    return 0.95f * safe_divide(sun, sun + w.map_irradiance);
+    return WORLD_SUN_MOST * safe_divide(sun, sun + w.map_irradiance);
 }
 
 // Density of sample_world at d, the world being chosen.
@@ -125,7 +126,7 @@ LUCH_FN_SLOW Vec3 sample_world(const WorldLight& w, Vec3 n, bool transmits, Vec2
             make_frame(w.sun_direction, &t, &b);
             return to_world(sample_cone(w.sun_one_minus_cos, {u.x / probability, u.y}), t, b, w.sun_direction);
         }
-        u.x = min_f((u.x - probability) / (1.0f - probability), 0.99999994f);
+        u.x = min_f((u.x - probability) / (1.0f - probability), BELOW_ONE);
     }
     return w.constant ? sample_world_uniform(n, transmits, u) : sample_world_map(w, u);
 }

@@ -31,33 +31,22 @@ LUCH_FN Vec2 sobol_2d(const Sampler& s, u32 dimension) {
     return {unit_float(reverse_bits(x)), unit_float(reverse_bits(y))};
 }
 
-// Third Sobol coordinate, by bytes of the index: what each byte's bits add, lowest bit first. Direction
-// numbers of the polynomial x^2 + x + 1 with m = 1, 3 (Joe and Kuo 2008, dimension 3).
-struct ThirdSobolTable {
-    u32 by_byte[4][256];
-
-    LUCH_FN constexpr ThirdSobolTable() : by_byte{} {
-        u32 m[32] = {1u, 3u};
-        for (int k = 2; k < 32; ++k) m[k] = (m[k - 1] << 1) ^ (m[k - 2] << 2) ^ m[k - 2];
-        for (int byte = 0; byte < 4; ++byte) {
-            for (u32 value = 0; value < 256u; ++value) {
-                for (int bit = 0; bit < 8; ++bit) {
-                    if (!((value >> bit) & 1u)) continue;
-                    int k = byte * 8 + bit;
-                    // m[k] has k + 1 binary places; as bits of a fraction, first digit lowest.
-                    for (int digit = 0; digit <= k; ++digit) {
-                        if ((m[k] >> (k - digit)) & 1u) by_byte[byte][value] ^= 1u << digit;
-                    }
-                }
-            }
-        }
-    }
-};
-LUCH_CONST ThirdSobolTable THIRD_SOBOL{};
-
-LUCH_FN u32 third_fold(u32 i) {
-    return THIRD_SOBOL.by_byte[0][i & 255u] ^ THIRD_SOBOL.by_byte[1][(i >> 8) & 255u] ^
-           THIRD_SOBOL.by_byte[2][(i >> 16) & 255u] ^ THIRD_SOBOL.by_byte[3][i >> 24];
+// Third Sobol coordinate of an index, lowest bit first: direction numbers of the polynomial x^2 + x + 1 with m = 1, 3 (Joe
+// and Kuo 2008, dimension 3). As digits of a fraction, first digit lowest, those are polynomials r_k in y with r_0 = 1,
+// r_1 = 1 + y, r_k = r_(k-1) + (1 + y^2) r_(k-2). With E for "the next one" E^2 + E = 1 + y^2, so an index, a polynomial
+// in E, is written in powers of u = E^2 + E, each with a digit for 1 and one for E: E^16 = u^8 + E^8, E^8 = u^4 + E^4 and
+// so on, four halvings. u^j is (1 + y^2)^j, Pascal's triangle over pairs of digits, and E is 1 + y: together what
+// pascal_fold does.
+LUCH_FN u32 third_fold(u32 x) {
+    x ^= (x >> 8) & 0x00ff0000u;
+    x ^= (x >> 8) & 0x0000ff00u;
+    x ^= (x >> 4) & 0x0f000f00u;
+    x ^= (x >> 4) & 0x00f000f0u;
+    x ^= (x >> 2) & 0x30303030u;
+    x ^= (x >> 2) & 0x0c0c0c0cu;
+    x ^= (x >> 1) & 0x44444444u;
+    x ^= (x >> 1) & 0x22222222u;
+    return pascal_fold(x);
 }
 
 // A three-dimensional point of one sequence: x, y form a (0, m, 2)-net, and what a choice by z leaves of

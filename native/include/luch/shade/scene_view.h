@@ -183,9 +183,10 @@ LUCH_FN Triangle triangle_at(const SceneView& scene, const MeshView& mesh, u32 p
 
 // An instance as it stands at a time; *moved: room for one that moves.
 LUCH_FN_SLOW void move_instance(const SceneView& scene, u32 index, float time, InstanceView* moved) {
+    const MotionView& motion = *scene.motion;
     *moved = scene.instances[index];
-    moved->to_world = transform_at(scene.motion->keys, scene.motion->instances[index], time);
-    moved->to_object = inverse_of(moved->to_world);
+    moved->to_world = to_world_at(motion.keys, motion.slides, motion.instances[index], time);
+    moved->to_object = to_object_at(motion.keys, motion.slides, motion.instances[index], time);
 }
 LUCH_FN const InstanceView& instance_at_time(const SceneView& scene, u32 index, float time, InstanceView* moved) {
     const InstanceView& still = scene.instances[index];

@@ -1,12 +1,13 @@
 // From a hit to a ShadePoints lane: position, normals, view direction, footprint.
 #pragma once
+#include "luch/geometry/surface.h"
 #include "luch/shade/scene_view.h"
 
 namespace luch {
 
 // Unit outward normal of the triangle in world space (zero area: an arbitrary unit vector).
 LUCH_FN Vec3 world_face_normal(const InstanceView& instance, const Triangle& t) {
-    Vec3 n = normalize_or(cross(t.p[1] - t.p[0], t.p[2] - t.p[0]), {0.0f, 0.0f, 1.0f});
+    Vec3 n = normalize_or(area_normal(t), {0.0f, 0.0f, 1.0f});
     return normalize_or(transform_direction_transposed(instance.to_object, n), n);
 }
 

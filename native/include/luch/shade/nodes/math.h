@@ -1,6 +1,7 @@
 // The Math node, one operation per mode. Domains are Blender's: what is undefined (a division by
 // zero, the root of a negative number) gives 0, never NaN.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/op.h"
 
 namespace luch {
@@ -65,8 +66,7 @@ LUCH_FLOAT_OP2(OpMathMaximum, max_f(a, b));
 LUCH_FLOAT_OP2(OpMathLessThan, a < b ? 1.0f : 0.0f);
 LUCH_FLOAT_OP2(OpMathGreaterThan, a > b ? 1.0f : 0.0f);
 LUCH_FLOAT_OP1(OpMathSign, sign_f(a));
-// 1.1920929e-7 is the smallest tolerance that Blender allows: one unit in the last place of 1.
-LUCH_FLOAT_OP3(OpMathCompare, a == b || abs_f(a - b) <= max_f(c, 1.1920929e-7f) ? 1.0f : 0.0f);
+LUCH_FLOAT_OP3(OpMathCompare, a == b || abs_f(a - b) <= max_f(c, COMPARE_LEAST) ? 1.0f : 0.0f);
 LUCH_FLOAT_OP3(OpMathSmoothMin, smooth_min(a, b, c));
 LUCH_FLOAT_OP3(OpMathSmoothMax, -smooth_min(-a, -b, c));
 

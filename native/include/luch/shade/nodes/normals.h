@@ -1,5 +1,6 @@
 // Nodes about normals: Fresnel, Layer Weight, Tangent, Bump, Normal Map, Displacement.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/nodes/point.h"
 
 namespace luch {
@@ -18,7 +19,7 @@ struct OpFresnel {  // in: index, normal
     static constexpr int inputs = 4, outputs = 1;
     static constexpr bool reads_point = true;
     LUCH_FN static void eval(const OpContext& c, const u32*, const float* in, float* out) {
-        float eta = max_f(in[0], 1e-5f);
+        float eta = max_f(in[0], SMALLEST_IOR);
         eta = (c.points->flags[c.lane] & PATH_BACKFACING) ? 1.0f / eta : eta;
         out[0] = dielectric_reflectance(dot(incoming_at(c), load_vec3(in + 1)), eta);
     }
@@ -27,7 +28,7 @@ struct OpLayerWeightFresnel {  // in: blend, normal
     static constexpr int inputs = 4, outputs = 1;
     static constexpr bool reads_point = true;
     LUCH_FN static void eval(const OpContext& c, const u32*, const float* in, float* out) {
-        float eta = max_f(1.0f - in[0], 1e-5f);
+        float eta = max_f(1.0f - in[0], SMALLEST_IOR);
         eta = (c.points->flags[c.lane] & PATH_BACKFACING) ? eta : 1.0f / eta;
         out[0] = dielectric_reflectance(dot(incoming_at(c), load_vec3(in + 1)), eta);
     }
@@ -37,7 +38,7 @@ struct OpLayerWeightFacing {  // in: blend, normal
     static constexpr bool reads_point = true;
     LUCH_FN static void eval(const OpContext& c, const u32*, const float* in, float* out) {
         float f = abs_f(dot(incoming_at(c), load_vec3(in + 1)));
-        float blend = clamp_f(in[0], 0.0f, 1.0f - 1e-5f);
+        float blend = clamp_f(in[0], 0.0f, 1.0f - LAYER_FACING_MARGIN);
         float exponent = blend < 0.5f ? 2.0f * blend : 0.5f / (1.0f - blend);
         out[0] = 1.0f - (in[0] != 0.5f ? pow_f(f, exponent) : f);
     }

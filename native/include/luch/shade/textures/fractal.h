@@ -1,6 +1,7 @@
 // Sums of gradient noise over octaves. Source of the multifractals: Musgrave in "Texturing and
 // Modeling: A Procedural Approach", 3rd edition, 2003; semantics as in Blender's Noise Texture.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/textures/perlin.h"
 
 namespace luch {
@@ -86,13 +87,12 @@ LUCH_FN F fractal_hetero(Coord<F, D> p, const FractalSettings<F>& s) {
 
 template <class F, int D>
 LUCH_FN F fractal_hybrid(Coord<F, D> p, const FractalSettings<F>& s) {
-    constexpr float negligible = 0.001f;
     const F one = spread<F>(1.0f);
     const Octaves<F> octaves(s.detail);
     F power = one, weight = one, value = F{};
-    auto live = weight > negligible;  // a lane whose weight has died stays dead
+    auto live = weight > FRACTAL_CUTOFF;  // a lane whose weight has died stays dead
     for (int i = 0; i <= octaves.longest; i++) {
-        live = live & octaves.has(i) & (weight > negligible);
+        live = live & octaves.has(i) & (weight > FRACTAL_CUTOFF);
         if (!any_lane(live)) break;
         const F w = lane_min(weight, one);
         const F signal = (signed_noise<F, D>(p) + s.offset) * power;
@@ -104,7 +104,7 @@ LUCH_FN F fractal_hybrid(Coord<F, D> p, const FractalSettings<F>& s) {
     if (octaves.fractional) {
         const F w = lane_min(weight, one);
         const F signal = (signed_noise<F, D>(p) + s.offset) * power;
-        value = select(weight > negligible, value + octaves.fraction * w * signal, value);
+        value = select(weight > FRACTAL_CUTOFF, value + octaves.fraction * w * signal, value);
     }
     return value;
 }

@@ -7,6 +7,7 @@
 //            6 orientation (radians), 7..9 orientation (vector)
 // GABOR_3D   the same                                            the same                         none
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/textures/hash.h"
 #include "luch/shade/textures/lane_op.h"
 
@@ -29,7 +30,7 @@ struct OpGabor : LaneOp<OpGabor<D>> {
         // Six standard deviations span the values; a kernel's integral squared is 1/4 (2D), 1/(4 sqrt 2) (3D).
         const float range = 6.0f * sqrt_f(float(GABOR_IMPULSES) * 0.5f * (D == 2 ? 0.25f : 0.17677669529663687f));
         Setup<F> s;
-        s.frequency = lane_max(in[4], spread<F>(0.001f));
+        s.frequency = lane_max(in[4], spread<F>(GABOR_LEAST_FREQUENCY));
         s.isotropy = 1.0f - lane_clamp(in[5], 0.0f, 1.0f);
         s.angle = in[6];
         if constexpr (D == 3) s.set_axis(in + 7);

@@ -5,6 +5,7 @@
 // operation  inputs                     outputs   params
 // IES        0..2 vector, 3 strength    0 factor  0 table offset
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/scene_view.h"
 
 namespace luch {
@@ -48,7 +49,6 @@ struct OpIes {
     };
 
     LUCH_FN static float brightness(const float* table, Vec3 v) {
-        constexpr float slack = 1e-7f;
         const int h_count = int(table[0]), v_count = int(table[1]);
         const float *h_angles = table + 2, *v_angles = h_angles + h_count;
         const float down = acos_f(-v.z), around = atan2_f(v.x, v.y) + PI;
@@ -56,7 +56,7 @@ struct OpIes {
         if (!(around >= h_angles[0] && around < h_angles[h_count - 1])) return 0.0f;
         const int i = find_interval(v_angles, v_count, down), j = find_interval(h_angles, h_count, around);
         const Rows rows{v_angles + v_count, v_count, i, (down - v_angles[i]) / (v_angles[i + 1] - v_angles[i]),
-                        v_angles[0] < slack};
+                        v_angles[0] < IES_POLE};
         // Past the first and the last row nearer ones stand in, as in Cycles.
         const float before = along_row(rows, j > 0 ? j - 1 : j);
         const float after = along_row(rows, j + 2 < h_count ? j + 2 : j);

@@ -13,6 +13,7 @@
 //                                                                                                 2 WaveProfile
 // WHITE_NOISE_1D..4D  0..2 vector, 3 w                                         0 value, 1..3 color  none
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/textures/fractal.h"
 #include "luch/shade/textures/lane_op.h"
 
@@ -21,7 +22,7 @@ namespace luch {
 // Unit coordinates fall on cell borders; this moves them off, the same way for every texture.
 template <class F>
 LUCH_FN F off_border(F x) {
-    return (lane_tame(x) + 0.000001f) * 0.999999f;
+    return (lane_tame(x) + OFF_BORDER) * (1.0f - OFF_BORDER);
 }
 
 enum class GradientType : u32 { LINEAR, QUADRATIC, EASING, DIAGONAL, RADIAL, QUADRATIC_SPHERE, SPHERICAL };
@@ -50,7 +51,7 @@ struct OpGradient : LaneOp<OpGradient> {
             return r * r * (3.0f - 2.0f * r);
         }
         // Just short of 1, so that the unit sphere itself is exactly zero.
-        const F r = lane_max(0.999999f - lane_sqrt(x * x + y * y + z * z), F{});
+        const F r = lane_max((1.0f - OFF_BORDER) - lane_sqrt(x * x + y * y + z * z), F{});
         return type == GradientType::SPHERICAL ? r : r * r;
     }
 };

@@ -4,6 +4,7 @@
 // SKY_ATMOSPHERE   0..2 direction (unit)   0..2 color  0 table offset (see SkyAtmosphere)
 // SKY_PREETHAM     the same                the same    0 table offset (see SkyPreetham)
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/scene_view.h"
 
 namespace luch {
@@ -98,7 +99,7 @@ struct OpSkyPreetham {
         const float cos_gamma =
             sin_f(theta) * sin_f(sky.sun_theta) * cos_f(sky.sun_phi - phi) + cos_f(theta) * cos_f(sky.sun_theta);
         const float gamma = acos_f(cos_gamma);
-        const float above = min_f(theta, 0.5f * PI - 0.001f);  // below the horizon, the horizon's colour
+        const float above = min_f(theta, 0.5f * PI - SKY_HORIZON);  // below the horizon, the horizon's colour
         float v[3];                                            // Y, x, y
         for (int k = 0; k < 3; k++) v[k] = sky.zenith[k] * perez(sky.perez[k], above, gamma);
         const float scale = v[2] != 0.0f ? v[0] / v[2] : 0.0f;

@@ -1,6 +1,7 @@
 // Voronoi cells: one pseudo-random point per unit cell, and what can be asked about the nearest ones.
 // Sources: Worley 1996; Quilez, "Voronoi distances", 2012; values as in Blender's Voronoi Texture.
 #pragma once
+#include "luch/math/bounds.h"
 #include "luch/shade/textures/hash.h"
 
 namespace luch {
@@ -202,7 +203,6 @@ LUCH_FN F edge_distance(const Coord<F, D>& p, F randomness) {
         const F to_right = (middle + frame.point(right, randomness).x[0]) * 0.5f;
         return lane_min(lane_abs(to_left - frame.local[0]), lane_abs(to_right - frame.local[0]));
     } else {
-        constexpr float same_point = 0.0001f;  // squared distance
         F nearest_order = spread<F>(FARTHEST);
         Coord<F, D> nearest{};
         IntOf<F> offset[D];
@@ -223,7 +223,7 @@ LUCH_FN F edge_distance(const Coord<F, D>& p, F randomness) {
             LUCH_UNROLL for (int d = 1; d < D; d++) along = along + (nearest.x[d] + v.x[d]) * across.x[d];
             const F length_2 = squared_length(across);
             const F edge = 0.5f * along / lane_sqrt(length_2);
-            distance = select((length_2 > same_point) & (edge < distance), edge, distance);
+            distance = select((length_2 > VORONOI_SAME_POINT) & (edge < distance), edge, distance);
         }
         return distance;
     }
