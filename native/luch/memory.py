@@ -87,9 +87,12 @@ def film_bytes(film: Film, pixel_bytes: float = LEAST_PIXEL_BYTES) -> float:
     return float(film.pixels) * pixel_bytes
 
 
-def require(scene: Scene, pixel_bytes: float = LEAST_PIXEL_BYTES) -> None:
-    """Raises NotEnoughMemory if film and copies alone are more than there is: structures come on top."""
-    picture, geometry = film_bytes(scene.film, pixel_bytes), scene_bytes(scene)
+def require(scene: Scene, pixel_bytes: float = LEAST_PIXEL_BYTES, prepared: bool = False) -> None:
+    """Raises NotEnoughMemory if film and copies alone are more than there is: structures come on top.
+
+    prepared: all but the film is there already.
+    """
+    picture, geometry = film_bytes(scene.film, pixel_bytes), 0.0 if prepared else scene_bytes(scene)
     free = available_bytes()
     if picture + geometry > free:
         raise NotEnoughMemory(_told(scene, picture, geometry, "at least", free))

@@ -18,17 +18,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from luch.render import Pace, Progress, Result, render
+from luch.kept import Kept
+from luch.render import Pace, Progress, Result, preparing, render
 from luch.scene import F32, Film, Scene
 
 # How often a render is asked whether its scene is still wanted: with a batch of paths beside, an edit waits so long.
 # Whoever waits at a window would rather know the error soon than have the last tenth of the speed.
 PACE = Pace(watch_seconds=0.02, look_share=0.05)
-COARSEST = 4  # pixels of the finished picture along a side of one of the first
+COARSEST = 4  # pixels of the finished picture along a side of one of the first, while their speed is not known
 MOST_COARSE = 32  # where pictures are given up before their first sample is there
+# The first picture is as fine as one of so many seconds: whoever turns a view wants to see it turn.
+FIRST_SECONDS = 0.05
+# A first picture under way is not given up for so long: where every move ended it, a view that turns would show nothing.
+PATIENCE_SECONDS = 0.08
+STILL_SECONDS = 0.25  # that a view must stand before a renderer is built for where it is
 # A step that shows the finished picture's size within this time needs no coarser one before it.
 AT_ONCE_SECONDS = 0.15
-MOST_BUILDING = 0.25  # of that time, for another picture between
 # Pictures are read at most so often, and reading takes at most this share of the time.
 PICTURE_SECONDS = 0.1
 PICTURE_SHARE = 0.1
@@ -89,7 +94,11 @@ class Preview:
         self._thread: threading.Thread | None = None
         self._ended = False
         self._version = 0
+        self._void = 0  # of this version and before it nothing is to be seen
         self._coarsest = COARSEST
+        self._pixel_seconds = 0.0  # of one sample, as seen last; 0: not yet
+        self.kept = Kept()  # the thread's, while there is one
+        self._forget = False  # what is kept
         self.picture: Picture | None = None
         self.text = ""
         self.failed = False
@@ -112,10 +121,14 @@ class Preview:
         """Nothing is wanted, and nothing is there to see."""
         with self._lock:
             self._version += 1
+            self._void = self._version
             self._wanted = None
             self.picture = None
             self.text, self.failed = "", False
             self.news += 1
+            self._forget = self._thread is not None
+            if not self._forget:
+                self.kept.drop()
 
     def stop(self, wait: bool = False) -> None:
         """For good. wait: return when the thread has ended."""
@@ -140,47 +153,76 @@ class Preview:
 
     def _run(self) -> None:
         while True:
-            with self._lock:
-                if self._wanted is None or self._ended:
-                    self._thread = None
-                    self.news += 1
-                    return
-                scene, tag, version = self._wanted
-                self._wanted = None
+            wanted = self._next()
+            if wanted is None:
+                return
             try:
-                self._draw(scene, tag, version)
+                self._draw(*wanted)
             except _Superseded:
                 pass
             except BaseException as error:  # told in words; the next scene may be better
-                self._fail(version, error)
+                self.kept.drop()
+                self._fail(wanted[2], error)
+
+    def _next(self) -> tuple[Scene, object, int] | None:
+        """What is to be drawn; None: nothing, and the thread is to end."""
+        rested = False
+        while True:
+            with self._lock:
+                if self._forget or self._ended:
+                    self.kept.drop()
+                    self._forget = False
+                wanted, self._wanted = self._wanted, None
+                if wanted is not None and not self._ended:
+                    return wanted
+                if rested:
+                    self._thread = None
+                    self.news += 1
+                    return None
+            self.kept.rest()  # without the lock: it may take its time, and another scene may come meanwhile
+            rested = True
 
     def _draw(self, scene: Scene, tag: object, version: int) -> None:
         """Each of the first pictures is half as coarse as the one before, until the finished size comes at once."""
-        factor = self._coarsest
+        factor = first = self._first_factor(scene.film)
+        seen = False
         try:
+            if factor == 1 and self.kept.is_far(scene):  # a picture at once, and then a renderer of its own
+                self._draw_coarse(scene, 1, tag, version, True)
             while factor > 1:
-                stats = self._draw_coarse(scene, factor, tag, version)
-                self._coarsest = COARSEST
-                finished_size = stats["render_seconds"] * factor * factor
-                # Every picture builds its structures anew.
-                if finished_size <= AT_ONCE_SECONDS or stats["prepare_seconds"] > MOST_BUILDING * finished_size:
+                self._draw_coarse(scene, factor, tag, version, factor == first)
+                self._coarsest, seen = COARSEST, True
+                if version != self._version:
+                    raise _Superseded
+                if self._pixel_seconds * scene.film.pixels <= AT_ONCE_SECONDS:
                     break
                 factor //= 2
         except _Superseded:
-            if factor == self._coarsest:  # not one was seen: views turn faster than pictures come
-                self._coarsest = min(2 * self._coarsest, MOST_COARSE)
+            if first > 1 and not seen:  # views turn faster than pictures come
+                self._coarsest = min(2 * first, MOST_COARSE)
             raise
         self._refine(scene, tag, version)
 
-    def _draw_coarse(self, scene: Scene, factor: int, tag: object, version: int) -> dict[str, Any]:
-        """One sample of every large pixel; the render's statistics."""
+    def _first_factor(self, film: Film) -> int:
+        """How coarse the first picture is to be: 1 is the finished size."""
+        if self._pixel_seconds == 0.0 or self._coarsest > COARSEST:
+            return self._coarsest
+        factor = 1
+        while factor < MOST_COARSE and self._pixel_seconds * film.pixels > FIRST_SECONDS * factor * factor:
+            factor *= 2
+        return factor
+
+    def _draw_coarse(self, scene: Scene, factor: int, tag: object, version: int, first: bool) -> None:
+        """One sample of every large pixel. The first picture is soon there, and drawn though the view turns on."""
         film = coarser(scene.film, factor)
         settings = replace(
             scene.settings, samples=1, time_limit=0.0, error_limit=0.0, adaptive=False, estimate_error=False
         )
-        result = self._render(replace(scene, film=film, settings=settings), version, None)
+        result = self._render(replace(scene, film=film, settings=settings), version, None, first)
+        self._pixel_seconds = result.stats["trace_seconds"] / film.pixels
+        nothing_yet = replace(preparing(scene.settings.samples, time.perf_counter()), preparing=False)
+        self._say(version, self._describe(nothing_yet))  # instead of what was said of the view before
         self._show(Picture(result.passes["Combined"], film, version, tag))
-        return result.stats
 
     def _refine(self, scene: Scene, tag: object, version: int) -> None:
         """Samples of the finished size, until a limit is reached."""
@@ -202,24 +244,38 @@ class Preview:
         self.stats = result.stats
         self._say(version, self._describe_end(result.stats))
 
-    def _render(self, scene: Scene, version: int, look: Callable[[Progress], None] | None) -> Result:
-        """Raises _Superseded as soon as another scene is wanted."""
+    def _render(
+        self, scene: Scene, version: int, look: Callable[[Progress], None] | None, patient: bool = False
+    ) -> Result:
+        """Raises _Superseded as soon as another scene is wanted; patient: some moments later."""
+        self.kept.hurried = patient
+        if not patient and self.kept.is_far(scene):
+            self._stand(version)
+        ends = time.perf_counter() + (PATIENCE_SECONDS if patient else 0.0)
 
         def goes_on(progress: Progress) -> bool:
-            if version != self._version:
+            if version <= self._void or (version != self._version and time.perf_counter() >= ends):
                 raise _Superseded
             if look is not None:
                 look(progress)
             return True
 
-        result = render(scene, progress=goes_on, pace=PACE)
-        if version != self._version:
+        result = render(scene, progress=goes_on, pace=PACE, kept=self.kept)
+        if version <= self._void or (version != self._version and not patient):
             raise _Superseded
         return result
 
+    def _stand(self, version: int) -> None:
+        """Building takes longer than a view takes to turn on: it would be thrown away again and again."""
+        until = time.perf_counter() + STILL_SECONDS
+        while time.perf_counter() < until:
+            if version != self._version:
+                raise _Superseded
+            time.sleep(0.005)
+
     def _show(self, picture: Picture) -> None:
         with self._lock:
-            if picture.version == self._version:
+            if picture.version > self._void:
                 self.picture = picture
                 self.failed = False
                 self.news += 1

@@ -23,8 +23,8 @@ from luch.adaptive import Adaptive
 from luch.check import check_scene
 from luch.cuda.device import faults_told
 from luch.curve import Curve, Forecast, next_target
-from luch.effects import effects_of
 from luch.effects.removal import without
+from luch.kept import Kept
 from luch.merge import Sums
 from luch.scene import F32, Film, Scene, Settings
 from luch.stopping import CUSTOM, Stopping
@@ -116,6 +116,7 @@ def _not_adaptive(settings: Settings) -> list[str]:
 
 def _renderer_for(scene: Scene) -> tuple[Any, list[str]]:
     """The device's renderer; where CUDA is asked for and cannot be had, the CPU's and one sentence that says why."""
+    memory.require(scene)
     if scene.settings.device == "CPU":
         return core.render.Renderer(scene), []
     if scene.settings.device != "CUDA":
@@ -227,13 +228,13 @@ class _Loop:
             return
         began, busy = time.perf_counter(), time.thread_time()
         mean, deviation, share = self.renderer.deviations()
-        found = accuracy.estimate(mean, deviation)
+        found = accuracy.estimate(mean, deviation, share)
         self._look_cost = time.perf_counter() - began
         self._look_busy = time.thread_time() - busy
         if found is not None:
             self.curve.add(self.done, self.seconds, found, share)
             if not self.stopping.look(self.curve) and self.adaptive is not None:
-                self.adaptive.decide(mean, deviation, self.done)
+                self.adaptive.decide(mean, deviation, share, self.done)
 
     def _fraction(self, samples: float) -> float:
         """Of the whole work: whichever end is nearer."""
@@ -277,12 +278,14 @@ class _Loop:
         return "error" if self.stopping.reached else "time" if self.timed_out else "samples"
 
 
-def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, pace: Pace = PACE) -> Result:
+def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, pace: Pace = PACE,
+           kept: Kept | None = None) -> Result:  # fmt: skip
     """Renders ``scene`` as its settings say, until its samples, its time limit or the error asked for are reached.
 
     progress is called as pace says (by luch.quality, denoise and verify as by default, ten times a second) and at the end of every
     step; returning False cancels, and the film so far is returned (``Result.cancelled``); what it raises ends the
-    render at once and comes out of here. Raises ValueError for a scene that does not
+    render at once and comes out of here. kept: what the last render with it has built is used where that serves, and
+    left there for the next one (not by luch.quality, denoise and verify). Raises ValueError for a scene that does not
     fit together, naming the object, MemoryError with the bytes it would take where there are fewer,
     luch.cuda.DeviceError for a GPU that fails while it renders.
     """
@@ -300,20 +303,25 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
         return render_verified(scene, progress=progress)
     start = time.perf_counter()
     check_scene(scene)
-    effects = effects_of(scene).as_dict()
-    scene = without(scene, scene.settings.without_effects)
+    whole, scene = scene, without(scene, scene.settings.without_effects)
     wanted = pixel_error.wanted(scene.film)
     own = [name for name in scene.film.passes if name not in wanted]
     settings = scene.settings
     if wanted or settings.error_limit > 0.0 or settings.mergeable:
         settings = replace(settings, estimate_error=True)
     traced = replace(scene, film=replace(scene.film, passes=own), settings=settings)
-    memory.require(traced)
+    kept = kept or Kept()
     with memory.explained(traced), faults_told():
-        renderer, warnings = _renderer_for(traced)
-        memory.require(traced, renderer.stats()["film_pixel_bytes"] + memory.READ_PIXEL_BYTES)
+        prepared = kept.renderer_for(whole, traced, _renderer_for)
+        renderer, warnings, traced = prepared.renderer, prepared.warnings, prepared.scene
+        pixel_bytes = renderer.stats()["film_pixel_bytes"] + memory.READ_PIXEL_BYTES
+        memory.require(traced, pixel_bytes, prepared.reused)
         loop = _Loop(renderer, scene, settings, progress, start, pace)
-        loop.prepare()
+        loop.prepared = time.perf_counter()
+        if not prepared.reused:
+            loop.prepare()
+        if not loop.cancelled:
+            kept.keep(whole, prepared)
         loop.run()
         passes = {name: np.asarray(image) for name, image in renderer.passes().items()}
     stats = dict(renderer.stats())
@@ -324,6 +332,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
         error_asked=settings.error_limit,
         time_asked=settings.time_limit,
         prepare_seconds=loop.prepared - start,
+        reused=prepared.reused,  # what earlier renders had built
         render_seconds=loop.render_seconds,
         seed=settings.seed,
         sampler=settings.sampler,
@@ -340,7 +349,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
             *getattr(renderer, "warnings", []),
         ],
         geometry_report=door.report(stats, scene),
-        effects=effects,
+        effects=prepared.effects,
     )
     if loop.adaptive is not None:
         stats.update(loop.adaptive.statistics(renderer.film_arrays()[1]))
@@ -353,6 +362,6 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
     sums = None
     if settings.mergeable:
         rows, counts = renderer.film_arrays()
-        sums = Sums(traced.film, scene.origin, np.array(rows), np.array(counts), settings.seed, settings.first_sample,
+        sums = Sums(traced.film, traced.origin, np.array(rows), np.array(counts), settings.seed, settings.first_sample,
                     loop.done, loop.curve.rate(), sampler=settings.sampler)  # fmt: skip
     return Result(passes, stats, loop.cancelled, sums)

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from luch._native import core
+from luch.bounds import SMALLEST_SKY_SUN
 
 F32 = NDArray[np.float32]
 
 EARTH_RADIUS_M = 6371e3
-SMALLEST_SUN = 0.0005  # radians
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def sun_direction(elevation: float, rotation: float) -> tuple[float, float, floa
 def atmosphere_table(a: Atmosphere) -> F32:
     """SkyAtmosphere as float32: 14 numbers of the sun, then (256, 256, 3) of the sky's left half."""
     elevation, rotation = wrap_sun(a.sun_elevation, a.sun_rotation)
-    diameter = max(a.sun_size, SMALLEST_SUN)
+    diameter = max(a.sun_size, SMALLEST_SKY_SUN)
     bottom, top = (_disc_radiance(a, elevation + end * diameter, diameter) for end in (-0.5, 0.5))
     densities = (a.air_density, a.aerosol_density, a.ozone_density)
     radiance = core.sky.radiance(a.multiple_scattering, elevation, a.altitude, *densities)

@@ -47,8 +47,8 @@ def watched(
             if thread.is_alive() and asked_to_go_on and not goes_on():
                 asked_to_go_on = False
                 renderer.cancel()
-    except BaseException:  # Ctrl-C, or the caller's own
-        renderer.cancel()
+    except BaseException:  # Ctrl-C, or the caller's own: nobody will read the film
+        getattr(renderer, "abandon", renderer.cancel)()
         thread.join()
         raise
     if thread.error is not None:

@@ -7,7 +7,6 @@ view's matrices to the same class that the engine calls.
 from __future__ import annotations
 
 import gc
-import os
 import sys
 import threading
 import weakref
@@ -24,11 +23,13 @@ from luch.cuda import DeviceError
 from luch.scene import Film
 from mathutils import Matrix
 from numpy.typing import NDArray
+from support.frames import resident_mib
 from support.viewports import (
     HEIGHT,
     WAIT_S,
     WIDTH,
     Window,
+    as_fresh,
     depsgraph,
     edits,
     orthographic,
@@ -142,6 +143,25 @@ def test_a_view_that_turns_reads_no_mesh(room: bpy.types.Scene) -> None:
     assert view._cache.read_count == read
     assert not np.array_equal(view.preview.picture.pixels, before)
     assert np.array_equal(view.preview.picture.pixels, shown(Viewport(), window))
+
+
+def test_a_view_that_turns_zooms_or_grows_builds_nothing(room: bpy.types.Scene) -> None:
+    window, view = Window(), Viewport()
+    before = shown(view, window)
+    for number in range(6):
+        window.look_from(0.2 * number, 0.1, 5.0 + number)
+        window.region.data.window_matrix = perspective(0.3 + 0.05 * number, 0.3)
+        window.region.width = WIDTH + 2 * number
+        view.follow(window, depsgraph())
+        assert view.preview.wait(WAIT_S) and view.preview.picture is not None
+        assert view.preview.stats["reused"] and view.preview.stats["structure_seconds"] == 0.0
+        assert np.array_equal(view.preview.picture.pixels, as_fresh(view, window))
+    room.luch.preview_samples = 7
+    assert not np.array_equal(shown(view, window), before)
+    assert view.preview.kept.builds == 1 and view.preview.stats["samples"] == 7
+    bpy.data.objects["Cube"].location.x += 0.5
+    shown(view, window)
+    assert view.preview.kept.builds == 2 and not view.preview.stats["reused"]
 
 
 def test_a_mesh_that_is_edited_is_seen_as_it_is_edited(room: bpy.types.Scene) -> None:
@@ -260,7 +280,7 @@ def test_after_edits_at_high_rate_a_view_shows_the_last_state(room: bpy.types.Sc
     window, view = Window(), Viewport()
     edits(120, 1.0, window, view)
     assert view.preview.wait(WAIT_S) and view.preview.picture is not None, view.text
-    assert np.array_equal(view.preview.picture.pixels, shown(Viewport(), window))
+    assert np.array_equal(view.preview.picture.pixels, as_fresh(view, window))
 
 
 def other_file() -> None:
@@ -308,8 +328,7 @@ def test_a_view_that_blender_closes_ends_its_thread(room: bpy.types.Scene) -> No
 def footprint() -> tuple[float, int]:
     """Resident MiB, threads."""
     gc.collect()
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGESIZE") / MIB, threading.active_count()
+    return resident_mib(), threading.active_count()
 
 
 @pytest.mark.promise(8)

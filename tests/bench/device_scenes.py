@@ -189,7 +189,8 @@ def _choose_gpu(bpy: Any, scene: Any, backend: str) -> None:
 
 
 def judge(options: argparse.Namespace) -> int:
-    """The table and its geometric mean; writes tests/bench/records/scenes-cuda.json."""
+    """The table and its geometric mean; writes tests/bench/records/scenes-cuda.json, or, where no peer rendered,
+    scenes-cuda-luch.json."""
     import numpy as np
     from scenes import scenes_folder
     from support import pictures
@@ -223,16 +224,12 @@ def judge(options: argparse.Namespace) -> int:
         print(f"{name:22} {row['seconds']:6.2f} s {row['error']:.5f}  bias {row['bias']:.1e}  energy "
               f"{'  '.join(f'{part:.4f}' for part in energy)}  {versus}  ratio {row['ratio'] or math.nan:.2f}  ({dear})")  # fmt: skip
     ratios = [row["ratio"] for row in rows if row["ratio"]]
-    mean = math.exp(sum(math.log(ratio) for ratio in ratios) / len(ratios))
-    print(f"geometric mean of the ratios {mean:.2f}; bar 1.0, goal 0.5")
-    record = {
-        "machine": ours["machine"],
-        "commit": ours["commit"],
-        "samples": SAMPLES,
-        "rows": rows,
-        "geometric_mean": mean,
-    }
-    target = ROOT / "tests" / "bench" / "records" / "scenes-cuda.json"
+    record = {"machine": ours["machine"], "commit": ours["commit"], "samples": SAMPLES, "rows": rows}
+    if ratios:
+        mean = math.exp(sum(math.log(ratio) for ratio in ratios) / len(ratios))
+        print(f"geometric mean of the ratios {mean:.2f}; bar 1.0, goal 0.5")
+        record["geometric_mean"] = mean
+    target = ROOT / "tests" / "bench" / "records" / f"scenes-cuda{'' if ratios else '-luch'}.json"
     target.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     return 0
 

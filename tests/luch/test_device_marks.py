@@ -18,8 +18,8 @@ class Device(Memory):
         self.counts = np.zeros((layers, pixels), np.uint32)
         self._marks = marks
 
-    def field(self, name: str, kind: str) -> int:
-        assert (name, kind) == ("film.layout.marks", "<I")
+    def field(self, name: str, task: bytes | bytearray | None = None) -> int:
+        assert (name, task) == ("film.layout.marks", None)
         return self._marks
 
 

@@ -71,6 +71,37 @@ def test_the_scene_submitted_last_is_drawn_and_a_stale_one_is_dropped_within_a_t
     assert np.array_equal(preview.picture.pixels, render(last).passes["Combined"])
 
 
+def test_the_words_are_of_the_view_that_is_shown() -> None:
+    preview = Preview()
+    preview.submit(scene_of(samples=4))
+    assert preview.wait(WAIT_S) and preview.text == "4 samples"
+    preview._pixel_seconds = 1.0  # as slow that the first picture is a coarse one
+    version = preview.submit(scene_of(256, 192, samples=1 << 16))
+    while preview.picture is None or preview.picture.version != version:
+        time.sleep(0.0005)
+    assert preview.text == "0 samples"
+    preview.stop(wait=True)
+
+
+def test_a_view_that_turns_without_pause_shows_pictures_and_builds_once() -> None:
+    preview, scene = Preview(), scene_of(640, 480, samples=1 << 16)
+    preview.submit(scene)
+    while preview.picture is None:
+        time.sleep(0.001)
+    seen = set()
+    for number in range(100):  # a mouse tells of a move more often than a picture comes
+        matrix = scene.camera.matrix.copy()
+        matrix[0, 3] += 0.01 * number
+        preview.submit(replace(scene, camera=replace(scene.camera, matrix=matrix)))
+        time.sleep(0.01)
+        seen.add(preview.picture.version)
+    preview.clear()
+    assert preview.picture is None
+    assert preview.wait(0.5) and preview.picture is None  # nothing of before comes back
+    assert len(seen) >= 5 and preview.kept.builds == 1, seen
+    assert preview.kept.origin is None  # nor is it kept
+
+
 @pytest.mark.parametrize(
     ("limits", "end"), [({"samples": 3}, "samples"), ({"time_limit": 0.3}, "time"), ({"error_limit": 0.2}, "error")]
 )

@@ -9,6 +9,7 @@ ahead of time lies in luch/kernels and is taken first; its key leaves out the co
 from __future__ import annotations
 
 import collections
+import ctypes
 import functools
 import hashlib
 import json
@@ -16,6 +17,7 @@ import os
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -156,6 +158,56 @@ def compiled_scene(module: str, precision: str, architecture: int, programs: str
         return _kept(name) or _compile_and_keep(nvrtc, unit)
 
 
+class Compilation(threading.Thread):
+    """A scene's own kernels on their way, while general ones render it."""
+
+    def __init__(self, asked: tuple[str, str, int, str, tuple[str, ...]]) -> None:
+        """asked: of compiled_scene."""
+        super().__init__(name="Luch compiles kernels", daemon=True)
+        self._asked = asked
+        self.image: bytes | None = None
+        self.failure: Exception | None = None
+        self.seconds = 0.0
+
+    def run(self) -> None:
+        began = time.perf_counter()
+        try:
+            self.image = compiled_scene(*self._asked)
+        except Exception as error:  # handed to the threads that render, which raise it
+            self.failure = error
+        self.seconds = time.perf_counter() - began
+        with _STARTING:
+            del _UNDER_WAY[self._asked]
+
+
+_UNDER_WAY: dict[tuple[str, str, int, str, tuple[str, ...]], Compilation] = {}
+_STARTING = threading.Lock()
+
+
+def compiling_scene(
+    module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]
+) -> Compilation:
+    """compiled_scene on a thread, one however many renders ask for the same: an animation draws hundreds of frames
+    while its kernels compile.
+    """
+    asked = (module, precision, architecture, programs, tuple(defines))
+    with _STARTING:
+        if asked not in _UNDER_WAY:
+            _UNDER_WAY[asked] = Compilation(asked)
+            _UNDER_WAY[asked].start()
+        return _UNDER_WAY[asked]
+
+
+def quiet(seconds: float = float("inf")) -> bool:
+    """Waits until nothing is compiled any more, so long at most; whether that is so."""
+    ends = time.monotonic() + seconds
+    while under_way := list(_UNDER_WAY.values()):
+        if time.monotonic() >= ends:
+            return False
+        under_way[0].join(min(threading.TIMEOUT_MAX, ends - time.monotonic()))
+    return True
+
+
 class _Unit(NamedTuple):
     module: str
     precision: str
@@ -179,11 +231,20 @@ def _kept(name: str) -> bytes | None:
 
 
 def _compile_and_keep(nvrtc: Any, unit: _Unit) -> bytes:
-    image = _compile(nvrtc, unit)
+    try:
+        image = _compile(nvrtc, unit)
+    finally:
+        _give_back()
     folder = cache_folder()
     if folder is not None:
         _keep(folder, _cache_name(nvrtc, unit), image)
     return image
+
+
+def _give_back() -> None:
+    """What NVRTC took and freed, half a gigabyte for a scene's stages: glibc's heap would keep it."""
+    if sys.platform == "linux" and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)) is not None:
+        trim(0)
 
 
 def _compile(nvrtc: Any, unit: _Unit) -> bytes:

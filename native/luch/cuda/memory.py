@@ -12,14 +12,16 @@ from luch.cuda.device import cupy
 
 NONE = 0xFFFFFFFF  # of luch/platform.h: not there
 MARK_CHANNELS = 4  # of luch/film/film.h
-RAY_SHADOW = 32  # RayKind of luch/geometry/ray.h
+RAY_CAMERA, RAY_SHADOW = 1, 32  # RayKind of luch/geometry/ray.h
 COUNTERS = (
     "rays",
     "next_rays",
     "shadows",
     "hits",
     "traced",
+    "traced_after",
     "shadowed",
+    "shadowed_after",
     "walks",
     "walked",
     "see_through",
@@ -41,21 +43,64 @@ class Memory:
 
     def __init__(self, task: bytes, pixels: int, materials: int, paths: int, beside: Beside) -> None:
         """paths: so many at once, or a few less."""
-        cp, fields, sizes = cupy(), core.render.task_fields(), core.render.task_sizes()
-        self._fields, self._task = fields, bytearray(task)
-        stride = self.field("film.layout.stride", "<I")
-        aovs = self.field("film.layout.aov_count", "<I")
-        shadows = 1 + (self.field("film.layout.ambient_occlusion", "<I") != NONE) + beside.walks + beside.media
+        self._fields, self.beside = core.render.task_fields(), beside
+        self.all_that_fits = False  # more paths were wanted than the device has room for
+        self._film = cupy().empty(0, np.float64)
+        self._lay_out(task, pixels, paths)
+        self.held = self.slots
+        self._allocate(materials)
+        self._point()
+
+    def restart(self, task: bytes, pixels: int, paths: int) -> bool:
+        """For another picture of the same scene, of at most `held` paths at once: the film's sums begin anew.
+
+        To be asked first: serves(). False: there is no room for so large a film beside the wavefront.
+        """
+        try:
+            self._lay_out(task, pixels, min(paths, self.held))
+        except cupy().cuda.memory.OutOfMemoryError:
+            return False
+        for name in ("counters", "totals", "material_first"):
+            self.arrays[name].fill(0)
+        self._point()
+        return True
+
+    def serves(self, task: bytes, beside: Beside) -> bool:
+        """Whether what paths have beside them here is what they need there."""
+        wanted = self._queued(task, beside), self.field("film.layout.aov_count", task)
+        return beside == self.beside and wanted == (self._shadows, self._aovs) and not beside.timed
+
+    def _queued(self, task: bytes | bytearray, beside: Beside) -> int:
+        """Shadow rays of one path that may wait at once."""
+        occlusion = self.field("film.layout.ambient_occlusion", task) != NONE
+        return 1 + occlusion + beside.walks + beside.media
+
+    def _lay_out(self, task: bytes, pixels: int, paths: int) -> None:
+        """The film, all 0, and how pixels and samples share the slots."""
+        self._task = bytearray(task)
+        stride = self.field("film.layout.stride")
+        self._aovs = self.field("film.layout.aov_count")
+        self._shadows = self._queued(task, self.beside)
         self.layer_pixels = min(pixels, paths)
         self.layers = max(1, paths // pixels)
-        slots = self.slots = self.layer_pixels * self.layers
+        self.slots = self.layer_pixels * self.layers
         self.pixels, self.stride = pixels, stride
+        sums = self.layers * pixels * stride
+        if self._film.size < sums:
+            self._film = cupy().empty(0, np.float64)  # freed before its successor is there
+            self._film = cupy().empty(sums, np.float64)
+        self.rows = self._film[:sums].reshape(self.layers, pixels, stride)
+        self.rows.fill(0.0)
+        self.counts = cupy().zeros((self.layers, pixels), np.uint32)
+
+    def _allocate(self, materials: int) -> None:
+        cp, sizes, slots, shadows, beside = (
+            cupy(), core.render.task_sizes(), self.held, self._shadows, self.beside
+        )  # fmt: skip
 
         def empty(count: int, kind: Any = np.uint8) -> Any:
             return cp.empty(count, kind)
 
-        self.rows = cp.zeros((self.layers, pixels, stride), np.float64)
-        self.counts = cp.zeros((self.layers, pixels), np.uint32)
         self.counters, self.totals = cp.zeros(sizes["counters"], np.uint32), cp.zeros(sizes["totals"], np.uint64)
         self.arrays = {
             "paths": empty(slots * sizes["path"]),
@@ -91,17 +136,21 @@ class Memory:
             }
         if beside.transparent:
             self.arrays["see_through"] = empty(slots * shadows, np.uint32)
-        if aovs:
-            self.arrays["aovs"] = empty(slots * aovs * 4, np.float32)
+        if self._aovs:
+            self.arrays["aovs"] = empty(slots * self._aovs * 4, np.float32)
         if beside.media:
             self.arrays["media"] = empty(slots * sizes["media"])
             self.arrays["shadow_media"] = empty(slots * shadows * sizes["media"])
+
+    def _point(self) -> None:
+        """The task's pointers, and those of the round after."""
+        beside = self.beside
         self._set("film.rows", "<Q", self.rows.data.ptr)
         self._set("film.sample_counts", "<Q", self.counts.data.ptr)
-        self._set("wave.slots", "<I", slots)
+        self._set("wave.slots", "<I", self.slots)
         self._set("wave.layer_pixels", "<I", self.layer_pixels)
-        self._set("wave.layer_stride", "<Q", pixels * stride)
-        self._set("wave.film_pixels", "<I", pixels)
+        self._set("wave.layer_stride", "<Q", self.pixels * self.stride)
+        self._set("wave.film_pixels", "<I", self.pixels)
         for name, array in self.arrays.items():
             self._set(f"wave.{name}", "<Q", array.data.ptr)
         self.tasks = [bytes(self._task), b""]
@@ -111,9 +160,9 @@ class Memory:
             self._set(f"wave.{following}", "<Q", self.arrays[own].data.ptr)
         self.tasks[1] = bytes(self._task)
 
-    def field(self, name: str, kind: str) -> int:
-        """A number of the task."""
-        value: int = struct.unpack_from(kind, self._task, self._fields[name])[0]
+    def field(self, name: str, task: bytes | bytearray | None = None) -> int:
+        """A uint32 of the task, or of another one."""
+        value: int = struct.unpack_from("<I", self._task if task is None else task, self._fields[name])[0]
         return value
 
     def _set(self, name: str, kind: str, value: int) -> None:
@@ -142,7 +191,7 @@ class Memory:
 
         To be called before that sample.
         """
-        marks = self.field("film.layout.marks", "<I")
+        marks = self.field("film.layout.marks")
         if marks == NONE or sample == 0 or sample & (sample - 1):
             return
         channel = marks + (0 if sample & 0x55555555 else MARK_CHANNELS)
@@ -153,7 +202,7 @@ class Memory:
     @property
     def bytes(self) -> int:
         """All of it."""
-        return int(self.rows.nbytes + self.counts.nbytes + sum(array.nbytes for array in self.arrays.values()))
+        return int(self._film.nbytes + self.counts.nbytes + sum(array.nbytes for array in self.arrays.values()))
 
 
 def bytes_per_path(stride: int, beside: Beside) -> float:

@@ -21,12 +21,12 @@ from luch._native import core
 from luch.adaptive import parts, regions_of
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
-from luch.cuda.memory import Beside, Memory, bytes_per_path
+from luch.cuda.memory import RAY_CAMERA, Beside, Memory, bytes_per_path
 from luch.cuda.plan import sampler_flags
 from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.timing import TIMED, StageClocks
 from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
-from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, images_to_leave, tiled, too_large
+from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, Links, images_to_leave, tiled, too_large
 from luch.ledger import REFUSALS
 
 BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
@@ -92,6 +92,18 @@ class HostScene:
         self.images = (tiled(blocks, links), links), trees, left, depth
         return True
 
+    def set_view(self, scene: Any) -> tuple[dict[str, Any], Blocks, Links] | None:
+        """The same scene looked at anew: its facts, blocks and links. None: devices need more than those of the view."""
+        if self.facts["world_reads_camera"]:
+            return None
+        self.core.set_view(scene)
+        before, self.facts = self.facts, self.core.device_facts()
+        if {**before, "most_rounds": 0} != {**self.facts, "most_rounds": 0}:
+            return None
+        blocks, links = self.core.device_view()
+        self._scene = scene
+        return self.facts, blocks, links
+
     def build_all(self) -> bool:
         """The same, with nothing left for devices to build. False when cancelled."""
         self.core = core.render.Renderer(self._scene, True)
@@ -143,16 +155,22 @@ class DeviceRenderer(HostFilm):
         """
         self._device = cupy().cuda.Device()
         super().__init__(host or HostScene(scene))
-        self._scene = scene
         self._lock = threading.Lock()
-        self._cancelled = False
+        self._held: Memory | None = None
+        self._stages: SceneKernels
+        self._timed = "Render Time" in scene.film.passes
+        self.warnings: list[str] = []
+        self._begin(scene)
+
+    def _begin(self, scene: Any) -> None:
+        """Nothing of the picture is there yet."""
+        self._scene = scene
+        self._cancelled = self._abandoned = False
         self._waves_done = self._waves = 0
         self._counts = {"paths": 0, "rays": 0, "shadow_rays": 0}
         self._trace_seconds = 0.0
         self._upload_seconds = 0.0
         self._merged = True
-        self._timed = "Render Time" in scene.film.passes
-        self.warnings: list[str] = []
 
     @property
     def device(self) -> str:
@@ -174,6 +192,42 @@ class DeviceRenderer(HostFilm):
         with self._device:
             return not self._cancelled and self._prepare()
 
+    def set_view(self, scene: Any) -> bool:
+        """As core.render.Renderer's. False: this view needs a renderer of its own."""
+        view = self._host.set_view(scene)
+        return view is not None and self.set_device_view(scene, *view)
+
+    def set_device_view(self, scene: Any, facts: dict[str, Any], blocks: Blocks, links: Links) -> bool:
+        """The same for this device, of what its host has made of the view."""
+        if self._timed or "Render Time" in scene.film.passes:
+            return False
+        with self._device:
+            enter_context()
+            began = time.perf_counter()
+            self._begin(scene)
+            if not self._arrays.refresh(blocks, links):
+                return False
+            if not self._stages.serve(facts, scene):
+                self._stages = SceneKernels(facts, blocks, scene)
+            self._prepare_waves(facts)
+            self._upload_seconds = time.perf_counter() - began
+        return True
+
+    def rest(self) -> None:
+        """Gives the wavefront's and the film's memory back; set_view() takes it again. Passes are to be read before."""
+        with self._device:
+            enter_context()
+            self._held = None
+            cupy().get_default_memory_pool().free_all_blocks()
+
+    def origin_reach(self) -> float:
+        """As core.render.Renderer's."""
+        rays = self._host.core.probe_rays()
+        with self._lock, self._device:
+            enter_context()
+            hits = self._tracer.closest_of(rays, np.full(len(rays), RAY_CAMERA, np.uint32))
+        return float(self._host.core.origin_reach_of(hits["t"], hits["instance"].view(np.uint32)))
+
     def _prepare(self) -> bool:
         enter_context()
         began = time.perf_counter()
@@ -188,12 +242,35 @@ class DeviceRenderer(HostFilm):
             if facts["subsurface"]
             else None
         )
+        self._prepare_waves(facts)
+        return not self._cancelled
+
+    def _prepare_waves(self, facts: dict[str, Any]) -> None:
+        """The film and the wavefront: those that are there, where they serve."""
         self._most_rounds = int(facts["most_rounds"])
         self._media = facts["media"] and bool(self._stages.plan["VOLUMES"])
         self._transparent = bool(facts["transparent"])
         beside = Beside(self._walks is not None, self._media, facts["moves"], self._timed, self._transparent)
-        self._memory = self._allocate(self._scene.film.pixels, max(1, facts["materials"]), beside)
-        return not self._cancelled
+        pixels, held = self._scene.film.pixels, self._held
+        if held is not None and held.serves(self._arrays.root, beside):
+            wanted = self._wanted_paths(pixels)
+            if (wanted <= held.held or held.all_that_fits) and held.restart(self._arrays.root, pixels, wanted):
+                return
+        if held is not None:
+            held = None
+            self.rest()  # the free memory is asked for below
+        self._held = self._allocate(pixels, max(1, facts["materials"]), beside)
+
+    def _wanted_paths(self, pixels: int) -> int:
+        """At once, were memory no matter."""
+        processors = int(cupy().cuda.Device().attributes["MultiProcessorCount"])
+        fills = 1 << max(20, (processors * PATHS_OF_MULTIPROCESSOR).bit_length() - 1)
+        return min(MOST_PATHS, fills, pixels * max(1, int(self._scene.settings.samples)))
+
+    @property
+    def _memory(self) -> Memory:
+        assert self._held is not None, "after prepare() or set_view()"
+        return self._held
 
     def _upload(self) -> tuple[dict[str, Any], Blocks]:
         """The scene and its trees; large ones are built on the device. What decides the scene's kernels."""
@@ -225,13 +302,13 @@ class DeviceRenderer(HostFilm):
         fields, root = core.render.task_fields(), self._arrays.root
         stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
         fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, beside))
-        samples = max(1, self._scene.settings.samples)
-        processors = int(cp.cuda.Device().attributes["MultiProcessorCount"])
-        fills = 1 << max(20, (processors * PATHS_OF_MULTIPROCESSOR).bit_length() - 1)
-        paths = min(MOST_PATHS, fills, fits, pixels * samples)
+        wanted = self._wanted_paths(pixels)
+        paths = min(fits, wanted)
         while paths >= min(FEWEST_PATHS, pixels):
             try:
-                return Memory(root, pixels, materials, paths, beside)
+                memory = Memory(root, pixels, materials, paths, beside)
+                memory.all_that_fits = paths < wanted
+                return memory
             except cp.cuda.memory.OutOfMemoryError:
                 cp.get_default_memory_pool().free_all_blocks()
                 paths //= 2
@@ -256,6 +333,7 @@ class DeviceRenderer(HostFilm):
     def _render(self, work: Sequence[Part]) -> bool:
         enter_context()
         began, waves = time.perf_counter(), list(self._waves_of(work))
+        charging = self._clocks.charging_seconds
         self._waves_done, self._waves = 0, len(waves)
         for pixels, wave in waves:
             if self._cancelled:
@@ -266,7 +344,8 @@ class DeviceRenderer(HostFilm):
                 self._trace_wave(*wave, pixels)
             self._waves_done += 1
         cupy().cuda.get_current_stream().synchronize()
-        self._trace_seconds += time.perf_counter() - began
+        charging = self._clocks.charging_seconds - charging
+        self._trace_seconds += time.perf_counter() - began - charging
         return not self._cancelled
 
     def _waves_of(self, work: Sequence[Part]) -> Iterator[tuple[Any, tuple[int, int, int, int]]]:
@@ -298,7 +377,7 @@ class DeviceRenderer(HostFilm):
         if self._media:
             self._launch(self._stages.kernel("enter_media"), 0, rays, self._tracer.root)
         turn, left = 0, self._most_rounds
-        while rays and left:
+        while rays and left and not self._abandoned:
             left -= 1
             shadows = self._trace_round(turn, rays)
             self._counts["rays"] += rays
@@ -362,7 +441,7 @@ class DeviceRenderer(HostFilm):
                 if self._transparent:
                     self._launch(self._stages.kernel("see_through"), turn, shadows, self._tracer.root)
             if not last:
-                memory.clear("shadows", "shadowed", "see_through")
+                memory.clear("shadows", "shadowed", "shadowed_after", "see_through")
         return shadows
 
     def _clock(self, stage: str) -> AbstractContextManager[None]:
@@ -375,6 +454,11 @@ class DeviceRenderer(HostFilm):
         """Callable from any thread: render() returns within one wave's time."""
         self._cancelled = True
         self._host.core.cancel()
+
+    def abandon(self) -> None:
+        """As cancel(), for a film that nobody will read: within one round's time. Until set_view()."""
+        self._abandoned = True
+        self.cancel()
 
     def step_progress(self) -> float:
         """Share of the running step that is done, 0..1."""
@@ -406,8 +490,8 @@ class DeviceRenderer(HostFilm):
         }
 
     def own_stats(self) -> dict[str, Any]:
-        """Those of them that are the device's; none before prepare()."""
-        if not hasattr(self, "_memory"):
+        """Those of them that are the device's; none before prepare() and after rest()."""
+        if self._held is None:
             return {}
         with self._device:
             totals = dict(zip(TOTALS, (int(x) for x in self._memory.totals.get()), strict=True))

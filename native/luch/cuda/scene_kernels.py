@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,8 @@ from luch.cuda import compiler
 from luch.cuda import plan as plans
 from luch.cuda.device import DeviceError, Kernel, Module, architecture_of, cupy
 from luch.cuda.programs import INSTRUCTION, Linked, operations, source
+from luch.kept import kind_of_view
+from luch.same import same
 from luch.scene import Scene
 
 STAGES = "RENDER_STAGES"
@@ -35,15 +35,25 @@ class SceneKernels:
             f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
             f"-DLUCH_STRUCTURE={structure}",
         ]
-        self.plan = plans.plan_of(scene, operations(programs, instructions), facts)
+        self._view = kind_of_view(scene)
+        self._operations = operations(programs, instructions)
+        self.plan = plans.plan_of(scene, self._operations, facts)
         self._flags += plans.flags(self.plan)
         self._precision = precision
         self._module: Module | None = None
-        self._ready: bytes | None = None
-        self._failure: BaseException | None = None
+        self._under_way: compiler.Compilation | None = None
         self.compile_seconds = 0.0
         self.general = False
         self._start(facts)
+
+    def serve(self, facts: dict[str, Any], scene: Scene) -> bool:
+        """Whether another view of the same scene needs the same code."""
+        view = kind_of_view(scene)
+        if not same(view, self._view):
+            if plans.plan_of(scene, self._operations, facts) != self.plan:
+                return False
+            self._view = view
+        return True
 
     def _start(self, facts: dict[str, Any]) -> None:
         architecture = architecture_of(cupy())
@@ -54,26 +64,26 @@ class SceneKernels:
         usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
         usable = usable and not any(self.plan[name] for name in compiler.rare_effects())
         general = compiler.ahead(STAGES, self._precision, architecture) if usable else None
-        if general is None:
-            self._compile(architecture)
+        self._compile(architecture)
+        if general is not None:
+            self._module, self.general = self._loaded(general), True
+        elif self._under_way is not None:
+            self._under_way.join()
             self._take()
-            return
-        self._module, self.general = self._loaded(general), True
-        threading.Thread(target=self._compile, args=(architecture,), daemon=True).start()
 
     def _compile(self, architecture: int) -> None:
-        began = time.perf_counter()
-        try:
-            self._ready = compiler.compiled_scene(STAGES, self._precision, architecture, self._text, self._flags)
-        except Exception as error:  # handed to the thread that renders, which raises it
-            self._failure = error
-        self.compile_seconds = time.perf_counter() - began
+        self._under_way = compiler.compiling_scene(STAGES, self._precision, architecture, self._text, self._flags)
 
     def _take(self) -> None:
-        if self._failure is not None:
-            raise DeviceError(f"The kernels of this scene do not compile: {self._failure}") from self._failure
-        if self._ready is not None:
-            self._module, self._ready, self.general = self._loaded(self._ready), None, False
+        compilation = self._under_way
+        if compilation is None or compilation.is_alive():
+            return
+        if compilation.image is None:
+            raise DeviceError(
+                f"The kernels of this scene do not compile: {compilation.failure}"
+            ) from compilation.failure
+        self._module, self._under_way, self.general = self._loaded(compilation.image), None, False
+        self.compile_seconds = compilation.seconds
 
     def _loaded(self, image: bytes) -> Module:
         self.code_bytes = len(image)  # of all stages, tables of constants included

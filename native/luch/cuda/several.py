@@ -106,6 +106,23 @@ class SeveralDevices(HostFilm):
         self._devices, self._rates = kept, [1.0] * len(kept)
         return not self._cancelled
 
+    def set_view(self, scene: Any) -> bool:
+        """As core.render.Renderer's. False: this view needs a renderer of its own."""
+        view = self._host.set_view(scene)
+        if view is None:
+            return False
+        self._film, self._merged, self._cancelled = scene.film, True, False
+        return all([device.set_device_view(scene, *view) for device in self._devices])
+
+    def rest(self) -> None:
+        """As DeviceRenderer's, of every device."""
+        for device in self._devices:
+            device.rest()
+
+    def origin_reach(self) -> float:
+        """As core.render.Renderer's."""
+        return self._devices[0].origin_reach()
+
     def render(self, first: int, count: int) -> bool:
         """Traces samples [first, first + count) of every pixel. False when cancelled."""
         self._merged = False
@@ -166,6 +183,12 @@ class SeveralDevices(HostFilm):
         self._cancelled = True
         for device in self._devices:
             device.cancel()
+
+    def abandon(self) -> None:
+        """As DeviceRenderer's, of every device."""
+        self._cancelled = True
+        for device in self._devices:
+            device.abandon()
 
     def step_progress(self) -> float:
         """Share of the running step that is done, 0..1: the slowest device's."""

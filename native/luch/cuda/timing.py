@@ -2,11 +2,13 @@
 
 A kernel's time, by CUDA's events, is shared among paths as their threads counted clock cycles in it: waiting for memory
 and for other lanes of the warp counts as theirs. What lies between those kernels (beginning paths, sorting, launches)
-is shared in the same proportion, so that a wave's pixels add up to the wave's time.
+is shared in the same proportion, so that a wave's pixels add up to the wave's time. Sharing takes some milliseconds a
+wave by itself; they belong to no pixel, and not to the time of tracing.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -24,6 +26,7 @@ class StageClocks:
 
     def __init__(self) -> None:
         self._runs: list[tuple[str, Any, Any]] = []
+        self.charging_seconds = 0.0  # that sharing itself has taken
 
     @contextmanager
     def running(self, stage: str) -> Iterator[None]:
@@ -40,6 +43,14 @@ class StageClocks:
 
         memory: luch.cuda.memory.Memory; those: which pixels of the film, a slice or a list; so many samples of each.
         """
+        began = time.perf_counter()
+        try:
+            self._share(memory, those, pixels, samples, seconds)
+            cupy().cuda.get_current_stream().synchronize()
+        finally:
+            self.charging_seconds += time.perf_counter() - began
+
+    def _share(self, memory: Any, those: Any, pixels: int, samples: int, seconds: float) -> None:
         cp = cupy()
         spent = dict.fromkeys(CLOCKS, 0.0)
         for stage, began, ended in self._runs:
@@ -56,6 +67,6 @@ class StageClocks:
         if not whole > 0.0:
             return
         share *= 1000.0 * seconds / whole
-        channel = memory.field("film.layout.time", "<I")
+        channel = memory.field("film.layout.time")
         parts = share.reshape(memory.layers, memory.layer_pixels)[:samples, :pixels]
         memory.rows[:samples, those, channel] += parts

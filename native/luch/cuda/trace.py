@@ -90,7 +90,7 @@ class SceneTracer:
         """Puts it on the current stream. All are addresses on the device.
 
         rays: 32 bytes each (luch::Ray), 16 bytes aligned; kinds: uint32 each, or 0; hits: HIT each; count: uint32, how
-        many; following: uint32, must be 0 when the kernel begins; times: float32 each, or 0; ticks: uint32 each, or 0.
+        many; following: two uint32, must be 0 when the kernels begin; times: float32 each, or 0; ticks: uint32 each, or 0.
         """
         self._launch(self._closest, rays, kinds, hits, 0, count, following, times, ticks)
 
@@ -105,7 +105,6 @@ class SceneTracer:
         kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, arguments)
         then = self._then.get(kernel.name)
         if then is not None:
-            self.kernel("fetch_anew").launch(1, BLOCK, arguments)
             then.launch(then.resident_blocks(BLOCK), BLOCK, arguments)
 
     def closest_of(self, rays: Any, kinds: Any = None, kernel: str = "", times: Any = None) -> Any:
@@ -132,7 +131,7 @@ class SceneTracer:
         kinds = None if kinds is None or not len(kinds) else cp.asarray(kinds)
         times = None if times is None else cp.asarray(times)
         results = cp.zeros(len(rays) * (1 if blocked else HIT.itemsize), np.uint8)
-        counts = cp.asarray(np.array([len(rays), 0], np.uint32))
+        counts = cp.asarray(np.array([len(rays), 0, 0], np.uint32))
 
         def run() -> None:
             counts[1:] = 0

@@ -18,6 +18,7 @@ from luch.cuda.device import DeviceError, cupy
 Blocks = list[tuple[str, Any]]  # name, (bytes,) uint8
 Links = list[tuple[int, int, int, int]]  # block that holds a pointer, its offset, block it leads to, offset there
 PIXELS = "pixels"  # name of an image's block
+VIEW_BLOCKS = ("camera", "filter", "shutter", "shutter times", "camera keys")  # those that a moved camera changes
 
 
 class HostBlock:
@@ -53,11 +54,36 @@ class DeviceCopy:
             if number and data.size:
                 self.arrays[number].set(np.frombuffer(patched[number], np.uint8) if number in patched else data)
         self.root = bytes(patched[0])
+        self._sizes = _sizes(blocks)
+
+    def refresh(self, blocks: Blocks, links: Links) -> bool:
+        """Takes the outermost view and VIEW_BLOCKS of the same scene anew; the others stay. False: sizes differ."""
+        if _sizes(blocks) != self._sizes:
+            return False
+        fresh = {
+            number: bytearray(data)
+            for number, (name, data) in enumerate(blocks)
+            if number == 0 or (name in VIEW_BLOCKS and data.size)
+        }
+        for block, offset, target, target_offset in links:
+            array = self.arrays[target]
+            if block in fresh:
+                struct.pack_into("<Q", fresh[block], offset, array.data.ptr + target_offset if array.size else 0)
+        for number, data in fresh.items():
+            if number:
+                self.arrays[number].set(np.frombuffer(data, np.uint8))
+        self.root = bytes(fresh[0])
+        return True
 
     @property
     def bytes(self) -> int:
         """On the device."""
         return sum(int(array.nbytes) for array in self.arrays[1:])
+
+
+def _sizes(blocks: Blocks) -> list[tuple[str, int]]:
+    """But for images, which tiled() fills up."""
+    return [(name, 0 if name == PIXELS else len(data)) for name, data in blocks]
 
 
 def _allocated(blocks: Blocks, left: Collection[int]) -> list[Any]:

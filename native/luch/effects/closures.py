@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from luch.bounds import FILM_MIN_THICKNESS_NM, LOBE_WEIGHT_CUTOFF
 from luch.shader_code import PRINCIPLED, Node, Value
-
-LOBE_CUTOFF = 1e-5  # LOBE_WEIGHT_CUTOFF: lighter lobes are left out
-THINNEST_FILM_NM = 0.1  # FILM_MIN_THICKNESS_NM
 
 _METAL = "roughness anisotropy rotation normal:3 tangent:3"
 _FILM = "thin_film_thickness thin_film_ior"
@@ -81,7 +79,7 @@ class Closure:
         """Whether its weight is known to be 0."""
         return self.vector("weight") == (0.0, 0.0, 0.0)
 
-    def may_pass(self, name: str, limit: float = LOBE_CUTOFF) -> bool:
+    def may_pass(self, name: str, limit: float = LOBE_WEIGHT_CUTOFF) -> bool:
         """Whether the input could be above a limit."""
         known = self.number(name)
         return known is None or known > limit
@@ -131,7 +129,7 @@ class Closure:
     def has_specular(self) -> bool:
         """Reflection of the dielectric: its index differs from that of air, or a film lies on it."""
         straight = self.number("ior") == 1.0 or self.number("specular_ior_level") == 0.0
-        return self.has_dielectric() and (not straight or self.may_pass("thin_film_thickness", THINNEST_FILM_NM))
+        return self.has_dielectric() and (not straight or self.may_pass("thin_film_thickness", FILM_MIN_THICKNESS_NM))
 
     def scatters_inside(self) -> bool:
         """Whether light may go under the surface: there is a weight and a radius, and the wall is not thin."""
@@ -142,7 +140,7 @@ class Closure:
 
     def _dead_inputs(self) -> set[str]:
         dead: set[str] = set()
-        film = "thin_film_thickness" in self._places and self.may_pass("thin_film_thickness", THINNEST_FILM_NM)
+        film = "thin_film_thickness" in self._places and self.may_pass("thin_film_thickness", FILM_MIN_THICKNESS_NM)
         if not film:
             dead.add("thin_film_ior")
         if self.name in ("CLOSURE_GLOSSY", "CLOSURE_METALLIC") and self.number("anisotropy") == 0.0:
@@ -228,7 +226,7 @@ def _glossy(c: Closure) -> Facts:
 
 
 def _film(c: Closure) -> Facts:
-    if c.may_pass("thin_film_thickness", THINNEST_FILM_NM):
+    if c.may_pass("thin_film_thickness", FILM_MIN_THICKNESS_NM):
         yield "thin film", f"has {c.says('thin_film_thickness', 'thin film thickness')} nm"
 
 

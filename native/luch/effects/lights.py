@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from luch.bounds import SMALLEST_HALF_SUN, SMALLEST_RADIUS
 from luch.effects.programs import Reading, read_program
 from luch.effects.shown import Shown
 from luch.effects.surfaces import TEXTURES, facts
@@ -10,7 +11,6 @@ from luch.scene import Light
 
 LAMPS = {"POINT": "point lamps", "SPOT": "spot lamps", "SUN": "sun lamps", "AREA": "area lamps"}
 _ALL_RAYS, _CAMERA = 63, 1  # RayKind bits
-_SMALLEST_ANGLE = 2e-5  # of a sun; smaller ones are points to the core
 # Effect -> operations that show it, and what the user calls it.
 _WORLDS: dict[str, tuple[tuple[str, ...], str]] = {
     "environment image": (("ENVIRONMENT", "IMAGE"), "an image"),
@@ -51,8 +51,8 @@ def _add_lamps(effects: Effects, name: str, lights: list[Light]) -> None:
 def _has_size(light: Light) -> bool:
     """Whether the lamp is more than a point, so that shadows are soft."""
     if light.kind == "SUN":
-        return light.angle >= _SMALLEST_ANGLE
-    return light.kind == "AREA" or light.radius > 0.0
+        return 0.5 * light.angle >= SMALLEST_HALF_SUN
+    return light.kind == "AREA" or light.radius >= SMALLEST_RADIUS
 
 
 def _add_lamp_facts(effects: Effects, lamps: list[Light]) -> None:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from luch.effects.closures import THINNEST_FILM_NM, Closure
+from luch.bounds import FILM_MIN_THICKNESS_NM
+from luch.effects.closures import Closure
 from luch.effects.programs import decode
 from luch.scene import Program, Scene
 from luch.shader_code import PRINCIPLED
@@ -101,7 +102,7 @@ def _lobes(c: Closure) -> int:
     count += (2 if thin else 1) * c.has_glass()
     if not c.has_dielectric():
         return count
-    film = c.may_pass("thin_film_thickness", THINNEST_FILM_NM)
+    film = c.may_pass("thin_film_thickness", FILM_MIN_THICKNESS_NM)
     count += 1 if film or c.has_specular() else 0
     inside = c.may_pass("subsurface_weight") and (thin or c.scatters_inside())
     return count + 1 + 2 * inside

@@ -1,0 +1,112 @@
+"""Kernels that compile while their scene is rendered: one compiler for all renders that wait for it. No GPU is needed."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import threading
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from luch.cuda import compiler, scene_kernels
+from luch.cuda.device import DeviceError
+from luch.scene import Scene
+from support.frames import resident_mib
+
+ASKED = ("RENDER_STAGES", "WATERTIGHT", 90, "programs", ("-DA=1",))
+FACTS = {"programs": [], "structure": "CWBVH", "registers": 8, "transparent": False}
+BLOCKS = [("instructions", np.zeros(0, np.uint8)), ("operands", np.zeros(0, np.uint8))]
+
+
+class Compiler:
+    """In the place of NVRTC: compiles when it is let."""
+
+    def __init__(self) -> None:
+        self.may_end, self.calls, self.error = threading.Event(), 0, ""
+
+    def __call__(self, *asked: Any) -> bytes:
+        self.calls += 1
+        assert self.may_end.wait(30.0)
+        if self.error:
+            raise DeviceError(self.error)
+        return b"own"
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
+    made = Compiler()
+    monkeypatch.setattr(compiler, "compiled_scene", made)
+    monkeypatch.setattr(compiler, "kept_scene", lambda *asked: None)
+    monkeypatch.setattr(compiler, "ahead", lambda *asked: b"general")
+    monkeypatch.setattr(
+        compiler, "scene_module", lambda image, device: SimpleNamespace(kernel=lambda name: (name, image))
+    )
+    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: dict.fromkeys(compiler.rare_effects(), False))
+    monkeypatch.setattr(scene_kernels, "architecture_of", lambda module: 90)
+    monkeypatch.setattr(scene_kernels, "cupy", lambda: SimpleNamespace(cuda=SimpleNamespace(Device=lambda: SimpleNamespace(id=0))))  # fmt: skip
+    yield made
+    made.may_end.set()
+    assert compiler.quiet(30.0)
+
+
+def frame() -> scene_kernels.SceneKernels:
+    return scene_kernels.SceneKernels(dict(FACTS), BLOCKS, Scene())
+
+
+@pytest.mark.promise(8)
+def test_a_hundred_frames_that_are_drawn_meanwhile_start_one_compiler(slow: Compiler) -> None:
+    threads = threading.active_count()
+    frames = [frame() for _ in range(100)]
+    assert threading.active_count() == threads + 1 and slow.calls == 1
+    assert all(one.general and one.kernel("shade")[1] == b"general" for one in frames)
+    slow.may_end.set()
+    assert compiler.quiet(30.0)
+    assert threading.active_count() == threads
+    assert all(one.kernel("shade")[1] == b"own" and not one.general for one in frames)
+
+
+def test_scenes_that_differ_are_compiled_beside_each_other(slow: Compiler) -> None:
+    first, other = compiler.compiling_scene(*ASKED), compiler.compiling_scene(*ASKED[:3], "others", ())
+    assert first is not other and compiler.compiling_scene(*ASKED) is first
+    assert not compiler.quiet(0.0)
+    slow.may_end.set()
+    assert compiler.quiet(30.0) and first.image == other.image == b"own"
+    assert compiler.compiling_scene(*ASKED) is not first
+
+
+def test_kernels_that_do_not_compile_are_told_by_every_frame_that_wants_them(slow: Compiler) -> None:
+    slow.error = "no such word"
+    frames = [frame(), frame()]
+    slow.may_end.set()
+    assert compiler.quiet(30.0)
+    for one in frames:
+        with pytest.raises(DeviceError, match="do not compile: no such word"):
+            one.kernel("shade")
+
+
+@pytest.mark.promise(8)
+@pytest.mark.skipif(sys.platform != "linux", reason="of glibc's heap")
+def test_what_a_compiler_took_of_the_heap_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    libc = ctypes.CDLL(None)
+    libc.malloc.restype, libc.free.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
+    block = 100_000  # as compilers ask for: below what glibc takes from the system apart
+
+    def hungry(nvrtc: Any, unit: Any) -> bytes:
+        taken = [libc.malloc(block) for _ in range(1500)]
+        for each in taken:
+            ctypes.memset(each, 1, block)
+        seen.append(resident_mib())
+        for each in taken[:-1]:  # the last one stays above the others: free() alone gives nothing back
+            libc.free(each)
+        return b"own"
+
+    libc.malloc_trim(0)  # what earlier tests left free would serve
+    seen = [resident_mib()]
+    monkeypatch.setattr(compiler, "_compile", hungry)
+    monkeypatch.setattr(compiler, "cache_folder", lambda: None)
+    assert compiler._compile_and_keep(None, compiler._Unit(*ASKED)) == b"own"
+    assert seen[1] - seen[0] > 100.0
+    assert resident_mib() - seen[0] < 20.0
