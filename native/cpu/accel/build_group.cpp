@@ -8,6 +8,7 @@
 #include "cpu/accel/build_moving.h"
 #include "cpu/accel/gather.h"
 #include "cpu/accel/group.h"
+#include "cpu/accel/slivers.h"
 #include "cpu/accel/tree2.h"
 
 namespace luch::cpu {
@@ -166,8 +167,22 @@ void make_structure(Group& group, const PrimBox* boxes, size_t kept, const Gathe
                     ThreadPool& pool) {
     std::vector<u32> refs;
     StructureInput input = collect(group, boxes, kept, gather, choice.quality, &refs, pool);
-    group.left = group.kind == GroupKind::TRIANGLES && kept >= choice.leave_from;
+    // Devices do not cut slivers.
+    group.left =
+        group.kind == GroupKind::TRIANGLES && kept >= choice.leave_from && boxes_met(boxes, kept, pool) < MANY_BOXES;
     if (!group.left) group.structure = build_structure(choice.kind, input, pool);
+}
+
+// Boxes for the wide tree's own builder, which knows no triangles.
+HugeArray<PrimBox> boxes_in_pieces(Group& group, HugeArray<PrimBox> boxes, size_t* kept, const Gather& gather,
+                                   ThreadPool& pool) {
+    if (group.kind != GroupKind::TRIANGLES || boxes_met(boxes.data(), *kept, pool) < MANY_BOXES) return boxes;
+    std::vector<u32> refs;
+    StructureInput input = collect(group, boxes.data(), *kept, gather, BuildQuality::NORMAL, &refs, pool);
+    boxes = cut_slivers(input.primitives, std::move(boxes), kept, pool);
+    group.corners = {};
+    group.flags = {};
+    return boxes;
 }
 
 // The wide tree by a binary builder of the quality asked for.
@@ -218,6 +233,7 @@ void build_group(Group& group, const SceneView& scene, const std::vector<std::ve
                                 {boxes[i].hi[0], boxes[i].hi[1], boxes[i].hi[2]}});
         return make_structure(group, boxes.data(), kept, gather, choice, pool);
     }
+    if (choice.quality == BuildQuality::NORMAL) boxes = boxes_in_pieces(group, std::move(boxes), &kept, gather, pool);
     Tree8 tree = choice.quality == BuildQuality::NORMAL
                      ? build_bvh8(std::move(boxes), kept, leaf_width(group), pool)
                      : collapse_tree(group, boxes.data(), kept, gather, choice, pool);

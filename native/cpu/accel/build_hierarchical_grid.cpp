@@ -1,9 +1,11 @@
 // Builds level by level: the cells of a level that hold many primitives become grids of the next. A budget of refs is
 // shared among them by their primitives, so memory is bounded whatever the scene.
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "cpu/accel/grid_cells.h"
+#include "cpu/accel/slivers.h"
 #include "cpu/accel/structure.h"
 #include "luch/accel/hierarchical_grid.h"
 
@@ -17,6 +19,8 @@ constexpr u32 LARGE = 1u << 15;       // a cell of more is divided by all thread
 // cells that hold any, of a long one all, as a teapot may fill one cell alone and be divided there.
 constexpr double WORTHWHILE = 0.45;
 constexpr u32 LONG_LIST = 64;
+// Exponent of the pieces that slivers are worth in a tree, for refs: one takes 4 bytes, a place in a tree 40.
+constexpr double SLIVER_REFS = 1.3;
 
 // A cell to be divided: its number in the built cells, what it is, and its primitives.
 struct DenseCell {
@@ -50,7 +54,8 @@ class HierarchicalGridStructure final : public StructureOf<HierarchicalGrid> {
  public:
     HierarchicalGridStructure(const StructureInput& input, ThreadPool& pool) : StructureOf(input.primitives) {
         Box box = box_of_primitives(primitives_, input.refs, input.count);
-        u64 most_refs = most_refs_of(input.count);
+        const double pieces = sliver_pieces(input, pool);
+        u64 most_refs = u64(double(most_refs_of(input.count)) * std::pow(pieces, SLIVER_REFS));
         u32 bits =
             choose_grid_bits(primitives_, input.refs, input.count, box, OUTER_CELLS_PER_PRIMITIVE, most_refs / 2, pool);
         GridCells outer = fill_grid(primitives_, input.refs, input.count, off_centre(box, bits), bits, pool);

@@ -7,6 +7,7 @@
 #include "cpu/accel/bvh8.h"
 #include "cpu/accel/kd_clip.h"
 #include "cpu/accel/kd_split.h"
+#include "cpu/accel/slivers.h"
 #include "cpu/accel/structure.h"
 #include "luch/accel/kd_tree.h"
 
@@ -15,6 +16,8 @@ namespace {
 
 constexpr size_t SUBTREE_REFS = 8192;  // cells of fewer refs are one thread's work
 constexpr size_t CHUNK_REFS = 4096;
+// Slivers that cross a cell side by side cross both of its halves alike: only quarters hold fewer of them.
+constexpr float SLIVER_PATIENCE = 1.2f;
 
 // A cell that is to be cut.
 struct Cell {
@@ -69,12 +72,13 @@ class Builder {
     template <class Below, class Above>
     void distribute(const KdRef* refs, size_t count, KdPlane cut, Below&& below, Above&& above) const;
     void cut_parallel(Open& from, KdPlane cut, Open* below, Open* above) const;
-    void build_top(std::vector<KdRef> all_refs);
+    void build_top(std::vector<KdRef> all_refs, double references);
     void build_subtree(Subtree& tree, const Cell& cell, size_t begin, size_t end) const;
     void join();
 
     const Primitives& all_;
     KdSettings settings_;
+    float patience_ = 1.0f;  // KdBins::choose
     ThreadPool& pool_;
     std::vector<TopNode> top_;
     std::vector<Open> open_;  // the subtrees' cells
@@ -86,7 +90,7 @@ KdPlane Builder::choose(const Cell& cell, const KdRef* refs, size_t count) const
     if (count < settings_.exact_below) return choose_exact_plane(refs, u32(count), cell.box, cell.spare);
     KdBins bins(cell.box);
     bins.add(refs, count);
-    return bins.choose(u32(count), cell.spare);
+    return bins.choose(u32(count), cell.spare, patience_);
 }
 
 KdPlane Builder::choose_parallel(const Cell& cell, const std::vector<KdRef>& refs) const {
@@ -96,7 +100,7 @@ KdPlane Builder::choose_parallel(const Cell& cell, const std::vector<KdRef>& ref
         parts[begin / CHUNK_REFS].add(refs.data() + begin, end - begin);
     });
     for (size_t i = 1; i < parts.size(); ++i) parts[0].add(parts[i]);
-    return parts[0].choose(u32(refs.size()), cell.spare);
+    return parts[0].choose(u32(refs.size()), cell.spare, patience_);
 }
 
 // Calls below(ref) and above(ref) for what is on either side.
@@ -135,8 +139,9 @@ void Builder::cut_parallel(Open& from, KdPlane cut, Open* below, Open* above) co
     divide(from.cell, count, cut, below->refs.size(), above->refs.size(), &below->cell, &above->cell);
 }
 
-void Builder::build_top(std::vector<KdRef> all_refs) {
-    u64 spare = u64(double(settings_.references - 1.0f) * double(all_refs.size())) + 64;
+// references: for each primitive, as many as slivers of a mesh are worth.
+void Builder::build_top(std::vector<KdRef> all_refs, double references) {
+    u64 spare = u64((references - 1.0) * double(all_refs.size())) + 64;
     std::vector<Open> waiting;
     waiting.push_back({{root, 0, spare}, std::move(all_refs), 0});
     top_.push_back({});
@@ -231,7 +236,9 @@ void Builder::build(const StructureInput& input) {
         extend(root, box);
     }
     if (input.count == 0) root = {make_vec3(0.0f), make_vec3(0.0f)};
-    build_top(std::move(list));
+    double pieces = sliver_pieces(input, pool_);
+    if (pieces > 1.0) patience_ = SLIVER_PATIENCE;
+    build_top(std::move(list), double(settings_.references) * pieces);
     subtrees_.resize(open_.size());
     pool_.parallel_for(open_.size(), 1, [&](size_t begin, size_t end, unsigned) {
         for (size_t i = begin; i < end; ++i) {

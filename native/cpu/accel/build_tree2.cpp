@@ -1,6 +1,7 @@
 // Binary trees: the choice of the builder, and what the builders share.
 #include <algorithm>
 
+#include "cpu/accel/slivers.h"
 #include "cpu/accel/tree2.h"
 
 namespace luch::cpu {
@@ -23,22 +24,12 @@ double expected_cost(const Tree2& tree) {
 Tree2 build_best(const StructureInput& input, HugeArray<PrimBox> boxes, u32 max_leaf, ThreadPool& pool,
                  const TreeCost& cost) {
     Tree2 cut = build_tree2_spatial(input, boxes, max_leaf, pool);
-    Tree2 sorted = build_tree2_binned(std::move(boxes), input.count, max_leaf, HALVING_LEVEL, pool);
+    size_t count = boxes.size();
+    Tree2 sorted = build_tree2_binned(std::move(boxes), count, max_leaf, HALVING_LEVEL, pool);
     return cost(cut) < cost(sorted) ? std::move(cut) : std::move(sorted);
 }
 
 }  // namespace
-
-HugeArray<PrimBox> gather_prim_boxes(const StructureInput& input, ThreadPool& pool) {
-    HugeArray<PrimBox> boxes(input.count);
-    pool.parallel_for(input.count, CHUNK, [&](size_t begin, size_t end, unsigned) {
-        for (size_t i = begin; i < end; ++i) {
-            Box b = primitive_box(input.primitives, input.refs[i]);
-            boxes[i] = {{-b.lo.x, -b.lo.y, -b.lo.z}, input.refs[i], {b.hi.x, b.hi.y, b.hi.z}, 0};
-        }
-    });
-    return boxes;
-}
 
 // Behind the top, in order of the subtrees.
 void append_subtrees(Tree2& tree, const std::vector<Subtree>& subtrees, ThreadPool& pool) {
@@ -70,11 +61,12 @@ void append_subtrees(Tree2& tree, const std::vector<Subtree>& subtrees, ThreadPo
 
 Tree2 build_tree2(const StructureInput& input, u32 max_leaf, ThreadPool& pool, const TreeCost& cost) {
     if (input.count == 0) return {};
-    HugeArray<PrimBox> boxes = gather_prim_boxes(input, pool);
-    if (input.quality == BuildQuality::FAST) return build_tree2_clusters(std::move(boxes), input.count, pool);
+    size_t count = input.count;
+    HugeArray<PrimBox> boxes = cut_slivers(input.primitives, boxes_of(input, pool), &count, pool);
+    if (input.quality == BuildQuality::FAST) return build_tree2_clusters(std::move(boxes), count, pool);
     if (input.quality == BuildQuality::HIGH)
         return build_best(input, std::move(boxes), max_leaf, pool, cost ? cost : expected_cost);
-    return build_tree2_binned(std::move(boxes), input.count, max_leaf, HALVING_LEVEL, pool);
+    return build_tree2_binned(std::move(boxes), count, max_leaf, HALVING_LEVEL, pool);
 }
 
 }  // namespace luch::cpu

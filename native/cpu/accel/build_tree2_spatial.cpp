@@ -156,10 +156,10 @@ Tree2 build_tree2_spatial(const StructureInput& input, const HugeArray<PrimBox>&
                           ThreadPool& pool) {
     Builder builder(input.primitives, max_leaf, pool);
     Subtree top = {0, std::vector<Bvh2Node>(2), {}};
-    PrimSet all = bound_all(boxes.data(), input.count, pool);
+    PrimSet all = bound_all(boxes.data(), boxes.size(), pool);
     builder.set_root_area(all.half_area());
-    u64 extra = u64(MAX_REPEATED * float(input.count));
-    builder.grow(top, 0, Boxes(boxes.data(), boxes.data() + input.count), extra, 0, true);
+    u64 extra = u64(MAX_REPEATED * float(boxes.size()));
+    builder.grow(top, 0, Boxes(boxes.data(), boxes.data() + boxes.size()), extra, 0, true);
     std::vector<Task>& tasks = builder.tasks;
     std::vector<Subtree>& subtrees = builder.subtrees;
     pool.parallel_for(tasks.size(), 1, [&](size_t begin, size_t end, unsigned) {

@@ -23,7 +23,7 @@ inline Ints one_more_where(Ints is_true, Ints count) {
 // The least cost seen so far among the planes of a cell, in units of PRIMITIVE_COST per half of the cell's area.
 class Best {
  public:
-    Best(const Box& cell, u32 count, u64 most_cut) : most_sides_(most_cut + count) {
+    Best(const Box& cell, u32 count, u64 most_cut, double patience) : most_sides_(most_cut + count) {
         double size[3];
         for (int axis = 0; axis < 3; ++axis) size[axis] = double(cell.hi[axis]) - double(cell.lo[axis]);
         for (int axis = 0; axis < 3; ++axis) {
@@ -33,7 +33,7 @@ class Best {
         }
         double half_area = across_[0] + across_[1] + across_[2];
         step_ = STEP_COST / PRIMITIVE_COST * half_area;
-        cost_ = half_area > 0 ? half_area * double(count) : -1;
+        cost_ = half_area > 0 ? patience * half_area * double(count) : -1;
     }
     void offer(int axis, float plane, double below_size, u32 below, u32 above) {
         double both = double(below) + double(above);
@@ -96,8 +96,8 @@ void KdBins::add(const KdBins& other) {
         }
 }
 
-KdPlane KdBins::choose(u32 count, u64 most_cut) const {
-    Best best(cell_, count, most_cut);
+KdPlane KdBins::choose(u32 count, u64 most_cut, float patience) const {
+    Best best(cell_, count, most_cut, double(patience));
     for (int axis = 0; axis < 3; ++axis) {
         float lo = cell_.lo[axis], hi = cell_.hi[axis];
         auto offer = [&](float plane, u32 below, u32 above) {

@@ -36,7 +36,8 @@ class KdBins {
     explicit KdBins(const Box& cell);
     void add(const KdRef* refs, size_t count);
     void add(const KdBins& other);
-    KdPlane choose(u32 count, u64 most_cut) const;
+    // patience: a plane may cost so many times what no cut costs, where what is gained shows after the next cut only.
+    KdPlane choose(u32 count, u64 most_cut, float patience) const;
 
  private:
     Box cell_;

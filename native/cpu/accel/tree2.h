@@ -34,8 +34,6 @@ Tree2 build_tree2_spatial(const StructureInput& input, const HugeArray<PrimBox>&
 // FAST: neighbours along a Morton curve, merged bottom up (Meister, Bittner 2018); the top is binned. Leaves hold one ref.
 Tree2 build_tree2_clusters(HugeArray<PrimBox> boxes, size_t count, ThreadPool& pool);
 
-HugeArray<PrimBox> gather_prim_boxes(const StructureInput& input, ThreadPool& pool);
-
 // A subtree that one thread built, for a place among the nodes of the top.
 struct Subtree {
     u32 at;
