@@ -70,7 +70,9 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--frame", type=int, help="frame to export (default: the file's current one)")
 
     test = add("test", "Run the tests. Other arguments go to pytest, e.g. -k lights.", passes_on=True)
-    test.add_argument("--sanitize", action="store_true", help="only tests/native, with AddressSanitizer and UBSan")
+    test.add_argument(
+        "--sanitize", action="store_true", help="tests/native and some hard cases, with AddressSanitizer and UBSan"
+    )
     fuzz = add(
         "fuzz", "Random scenes and damaged files, for as long as you like. --count, --kinds too.", passes_on=True
     )

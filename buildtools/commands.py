@@ -85,15 +85,22 @@ def _sanitized_environment() -> Dict[str, str]:
     }
 
 
+# What runs watched: all of tests/native, and of the hard cases those that ask the core's parts one by one.
+WATCHED = ["tests/native"] + [
+    f"tests/hard_cases/test_{name}.py"
+    for name in ("closures", "closure_samples", "light_samples", "medium_samples", "sampler", "structures")
+]
+
+
 def _test_sanitized(arguments: Arguments) -> int:
-    """tests/native with every memory access and every undefined operation watched."""
+    """WATCHED with every memory access and every undefined operation watched."""
     ensure_environment()
     folder = compile_sanitized(arguments.jobs)
     watched = _sanitized_environment()
     command = [str(VENV_PYTHON), "-m", "pytest", "-o", f"pythonpath={folder} . tests", "-p", "no:cacheprovider"]
     command.append("--capture=sys")  # what a sanitizer writes before it ends the process is seen
     # The CUDA kernels run there on fibers, whose stacks AddressSanitizer does not know, and from the source tree.
-    command += ["-m", "not long", "--ignore", "tests/native/test_accel_cuda.py", "tests/native"]
+    command += ["-m", "not long", "--ignore", "tests/native/test_accel_cuda.py", *WATCHED]
     return status([*command, *arguments.rest], extra=watched)
 
 

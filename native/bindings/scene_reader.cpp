@@ -136,6 +136,7 @@ struct Reader {
         if (moved.ndim() != 3 || moved.shape(0) < 2 || moved.shape(1) != points.shape(0) || moved.shape(2) != 4)
             throw std::invalid_argument("Mesh \"" + name + "\": motion_points of its curves must be (K, P, 4), " +
                                         "K at least 2.");
+        if (all_alike(moved, points.data())) return in;
         in.motion_keys = u32(moved.shape(0));
         in.motion_points = moved.data();
         return in;
@@ -213,12 +214,22 @@ struct Reader {
 
     bool still() const { return scene.attr("shutter").is_none(); }
 
+    // Whether every key is the shape itself, bit for bit: then it stands still, and is traced as what stands still.
+    static bool all_alike(const Array<float>& keys, const float* shape) {
+        size_t count = size_t(keys.shape(0)), size = size_t(keys.size()) / count;
+        for (size_t k = 0; k < count; k++)
+            if (size && std::memcmp(keys.data() + k * size, shape, size * sizeof(float)) != 0) return false;
+        return true;
+    }
+
     void read_mesh_motion(const py::object& mesh, Keep& keep, cpu::MeshInput& in) {
         if (still() || mesh.attr("motion_positions").is_none()) return;
         auto positions = keep.array<float>(mesh.attr("motion_positions"));
         if (positions.ndim() != 3 || positions.shape(0) < 2 || size_t(positions.shape(1)) != in.vertex_count ||
             positions.shape(2) != 3)
             throw std::invalid_argument("Mesh \"" + in.name + "\": motion_positions must be (K, V, 3), K at least 2.");
+        bool alike = all_alike(positions, in.positions);
+        if (alike && !in.normals) return;
         in.motion_keys = u32(positions.shape(0));
         in.motion_positions = positions.data();
         if (!in.normals) return;
@@ -226,6 +237,10 @@ struct Reader {
         auto normals = keep.array<float>(mesh.attr("motion_normals"));
         if (size_t(normals.size()) != in.motion_keys * rows * 3)
             throw std::invalid_argument("Mesh \"" + in.name + "\": motion_normals do not fit motion_positions.");
+        if (alike && all_alike(normals, in.normals)) {
+            in.motion_keys = 0, in.motion_positions = nullptr;
+            return;
+        }
         in.motion_normals = normals.data();
     }
 

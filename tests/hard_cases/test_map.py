@@ -39,6 +39,14 @@ def test_every_hard_case_names_its_tests() -> None:
     assert not bare, f"cases without a test: {bare}"
 
 
+def test_every_hard_case_is_held_among_the_hard_cases() -> None:
+    """Others may hold it, too: these alone run on the plain core, and together as the list asks for."""
+    elsewhere = [number for number, said in rows().items()
+                 if not any(path.startswith("hard_cases/") and name in named_in(path)
+                            for path, name in TEST.findall(said))]  # fmt: skip
+    assert not elsewhere, f"cases without a test under tests/hard_cases: {elsewhere}"
+
+
 def test_every_test_that_is_named_exists() -> None:
     missing = [f"{path}::{name}" for said in rows().values() for path, name in TEST.findall(said)
                if not (ROOT / "tests" / path).is_file() or name not in named_in(path)]  # fmt: skip

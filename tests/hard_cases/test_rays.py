@@ -11,22 +11,14 @@ import pytest
 from luch import core
 from luch.accel import KINDS, Accel, Device, Kind
 from support import closed_meshes
-from support.accel_meshes import F32, Mesh, aimed_rays, cube, icosphere, random_rays, rows, separate, soup
+from support.accel_meshes import F32, aimed_rays, cube, icosphere, random_rays, rows, separate, soup
+from support.hard_rays import assert_same_hits
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
 every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 # Rays a case: what each kind traces in some tenths of a second on one core.
 COUNT: dict[str, int] = {"BVH": 200_000, "BVH2": 50_000, "BRUTE_FORCE": 50}
 OTHERS = 20_000
-
-
-def assert_same_hits(accel: Accel, mesh: Mesh, rays: F32) -> int:
-    """Bit for bit brute force's; returns how many hit."""
-    truth = Accel(*mesh, kind="BRUTE_FORCE").closest(rays)
-    for a, b in zip(accel.closest(rays), truth, strict=True):
-        assert np.array_equal(a.view(np.uint32), b.view(np.uint32))
-    assert np.array_equal(accel.any(rays), truth[1] >= 0)
-    return int((truth[1] >= 0).sum())
 
 
 @every_device

@@ -1,6 +1,7 @@
 """The device's own headers under AddressSanitizer and UBSan, with what they must not stumble over.
 
-The core itself is watched by `build.py test --sanitize` (tests/native), kernels by compute-sanitizer on a GPU.
+The core itself is watched by `build.py test --sanitize` (tests/native and what stands in its list), kernels by
+compute-sanitizer on a GPU.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Surfaces at their limits, through whole renders. Numbers: the rows of the list of hard cases.
 
-Rows 40, 41 and 62 (reciprocity, sample = density, cosines beyond 1) need no picture: tests/native/test_bsdf.py and
-test_bsdf_sampling.py hold them.
+Rows 40, 41 and 62 (reciprocity, sample = density, cosines beyond 1) need no picture: test_closures.py and
+test_closure_samples.py hold them.
 """
 
 from __future__ import annotations

@@ -15,42 +15,13 @@ import pytest
 from luch.accel import Accel
 from luch.cuda import compiler, device
 from support import cuda_on_cpu
-from support.accel_meshes import HARD_MESHES, Mesh, aimed_rays, random_rays, rows, soup
+from support.accel_meshes import HARD_MESHES, aimed_rays, random_rays, rows, soup
 from support.cuda_on_cpu import FIBERS, GPU
+from support.hard_rays import assert_same_bits, device_rays
 
 from buildtools.kernels import faults
 
 KINDS = list(compiler.table()["modules"])
-FEW = ("soup", "needles", "identical", "duplicates", "one triangle", "points")  # meshes for the fibers, which are slow
-
-
-def some_rays(mesh: Mesh, place: str) -> Any:
-    count = 10_000 if place == GPU else 150
-    spread = 0.1 * np.stack(np.meshgrid(np.linspace(-1, 1, 8), np.linspace(-1, 1, 8)), -1).reshape(-1, 2)
-    camera = rows(np.array([0, 0, -4.0]), np.insert(spread, 2, 1.0, axis=1))  # warps of these go together
-    rays = np.concatenate([camera, random_rays(count), aimed_rays(mesh, count)])
-    rays[::7, 7] = np.linspace(0.1, 2, len(rays[::7]))  # some end early
-    rays[::11, 3] = 0.3
-    return rays
-
-
-def check_equal(ours: Any, truth: Any) -> None:
-    for name, a, b in zip(("t", "prim", "u", "v"), ours, truth, strict=True):
-        differ = np.flatnonzero(a.view(np.uint32) != b.view(np.uint32))
-        assert not len(differ), (
-            f"{name} of {len(differ)} rays, first {differ[0]}: {a[differ[0]]} against {b[differ[0]]}"
-        )
-
-
-@pytest.mark.parametrize("name", [n if n in FEW else pytest.param(n, marks=pytest.mark.cuda) for n in HARD_MESHES])
-@pytest.mark.parametrize("kind", KINDS)
-def test_hits_on_the_device_are_bit_equal_to_brute_force(place: str, kind: Any, name: str) -> None:
-    mesh = HARD_MESHES[name]
-    rays = some_rays(mesh, place)
-    oracle = Accel(*mesh, kind="BRUTE_FORCE")
-    ours = Accel(*mesh, kind=kind, device="CUDA")
-    check_equal(ours.closest(rays), oracle.closest(rays))
-    assert np.array_equal(ours.any(rays), oracle.any(rays))
 
 
 @pytest.mark.parametrize(
@@ -62,12 +33,12 @@ def test_spheres_transparency_and_bad_rays_are_as_on_the_cpu(place: str, kind: A
     spheres = np.concatenate([rng.uniform(-1, 1, (30, 3)), rng.uniform(-0.02, 0.2, (30, 1))], 1).astype(np.float32)
     flags = rng.random(70) < 0.5
     points[5], triangles[7, 1] = np.nan, 1_000_000
-    rays = some_rays((np.nan_to_num(points), soup(40)[1]), place)
+    rays = device_rays((np.nan_to_num(points), soup(40)[1]), place)
     rays[3, 4:7], rays[4, 0], rays[5, 7], rays[6, 3], rays[8, 3] = 0, np.nan, -1, np.nan, -5
     options = {"spheres": spheres, "may_be_transparent": flags, "precision": precision}
     oracle = Accel(points, triangles, kind="BRUTE_FORCE", **options)  # type: ignore[arg-type]
     ours = Accel(points, triangles, kind=kind, device="CUDA", **options)  # type: ignore[arg-type]
-    check_equal(ours.closest(rays), oracle.closest(rays))
+    assert_same_bits(ours.closest(rays), oracle.closest(rays))
     assert np.array_equal(ours.blocked(rays) != 0, oracle.blocked(rays) != 0)
     opaque = Accel(points, triangles, kind=kind, device="CUDA", spheres=spheres)
     assert set(np.unique(opaque.blocked(rays))) == {0, 1}
@@ -78,10 +49,10 @@ def test_spheres_transparency_and_bad_rays_are_as_on_the_cpu(place: str, kind: A
 def test_each_mapping_of_brute_force_gives_the_same_hits(place: str, kernel: str, count: int) -> None:
     mesh = soup(count)
     spheres = np.array([[0, 0, 0, 0.4], [0.2, 0, 0, 0.4], [0, 0, 0, 0.4]], np.float32)
-    rays = some_rays(mesh, place)[: None if place == GPU else 150]
+    rays = device_rays(mesh, place)[: None if place == GPU else 150]
     oracle = Accel(*mesh, kind="BRUTE_FORCE", spheres=spheres)
     ours = Accel(*mesh, kind="BRUTE_FORCE", spheres=spheres, device="CUDA").on_device
-    check_equal(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
+    assert_same_bits(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
 
 
 @pytest.mark.parametrize(
@@ -91,10 +62,10 @@ def test_each_mapping_of_brute_force_gives_the_same_hits(place: str, kernel: str
 @pytest.mark.parametrize("name", ["soup", "needles", "identical"])
 def test_other_kernels_of_a_structure_give_the_same_hits(place: str, kind: Any, kernel: str, name: str) -> None:
     mesh = HARD_MESHES[name]
-    rays = some_rays(mesh, place)
+    rays = device_rays(mesh, place)
     ours = Accel(*mesh, kind=kind, device="CUDA").on_device
     oracle = Accel(*mesh, kind="BRUTE_FORCE")
-    check_equal(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
+    assert_same_bits(ours.closest(rays, "WATERTIGHT", False, kernel)[:4], oracle.closest(rays))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -110,7 +81,7 @@ def test_kd_tree_starts_again_where_its_short_stack_ran_out(place: str) -> None:
     mesh = HARD_MESHES["size 2^-i"]
     rays = rows(np.zeros(3), np.random.default_rng(5).normal(size=(60, 3)))  # out of the deepest cell
     ours, cpu = Accel(*mesh, kind="KD_TREE", device="CUDA"), Accel(*mesh, kind="KD_TREE")
-    check_equal(ours.closest(rays), cpu.closest(rays))
+    assert_same_bits(ours.closest(rays), cpu.closest(rays))
     assert np.array_equal(ours.any(rays), cpu.any(rays))
     assert ours.count(rays)["nodes"] > 1.2 * cpu.count(rays)["nodes"]  # 1.57: it did run out
 
@@ -131,7 +102,9 @@ def test_hits_are_bit_equal_at_any_scale(place: str, kind: Any, scale: float) ->
     points, triangles = soup(100)
     mesh = ((points * np.float64(scale)).astype(np.float32), triangles)
     rays = aimed_rays(mesh, 10_000 if place == GPU else 100)
-    check_equal(Accel(*mesh, kind=kind, device="CUDA").closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays))
+    assert_same_bits(
+        Accel(*mesh, kind=kind, device="CUDA").closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays)
+    )
 
 
 BUILT = ("soup", "slivers", "identical", "duplicates", "coplanar", "size 2^-i", "sphere")
@@ -140,11 +113,11 @@ BUILT = ("soup", "slivers", "identical", "duplicates", "coplanar", "size 2^-i", 
 @pytest.mark.parametrize("name", BUILT)
 def test_tree_built_on_the_device_gives_brute_force_hits(place: str, name: str) -> None:
     mesh = HARD_MESHES[name]
-    rays = some_rays(mesh, place)
+    rays = device_rays(mesh, place)
     ours = Accel(*mesh, kind="CWBVH", quality="FAST", device="CUDA")
     assert ours.stats["built_on_device"]
     assert ours.stats["references"] == ours.stats["primitives"] > 100
-    check_equal(ours.closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays))
+    assert_same_bits(ours.closest(rays), Accel(*mesh, kind="BRUTE_FORCE").closest(rays))
     good = Accel(*mesh, kind="CWBVH", device="CUDA")
     if name != "identical":  # of copies the host's builders keep one, the device's keeps all
         assert ours.count(rays)["boxes"] <= 2.5 * good.count(rays)["boxes"]
@@ -156,8 +129,8 @@ def test_builder_on_the_device_drops_what_the_cpu_drops(place: str) -> None:
     ours = Accel(points, triangles, kind="CWBVH", quality="FAST", device="CUDA")
     cpu = Accel(points, triangles, kind="CWBVH")
     assert (ours.stats["primitives"], ours.stats["dropped"]) == (cpu.stats["primitives"], cpu.stats["dropped"])
-    rays = some_rays(soup(200), place)
-    check_equal(ours.closest(rays), cpu.closest(rays))
+    rays = device_rays(soup(200), place)
+    assert_same_bits(ours.closest(rays), cpu.closest(rays))
 
 
 @pytest.mark.cuda
@@ -168,7 +141,7 @@ def test_arrays_on_the_gpu_are_answered_there() -> None:
     rays = random_rays(1000)
     there = accel.closest(cupy.asarray(rays))
     assert all(isinstance(array, cupy.ndarray) for array in there)
-    check_equal([array.get() for array in there], accel.closest(rays))
+    assert_same_bits([array.get() for array in there], accel.closest(rays))
     assert isinstance(accel.any(cupy.asarray(rays)), cupy.ndarray)
     with pytest.raises(ValueError, match="lies on a GPU"):
         Accel(*soup(50)).closest(cupy.asarray(rays))
@@ -229,7 +202,7 @@ def test_kernels_compiled_ahead_of_time_are_taken_first(monkeypatch: pytest.Monk
         with pytest.raises(LookupError, match="BVH2 WATERTIGHT 90"):
             ours.closest(rays)
         (tmp_path / compiler.ahead_name("BVH2", "WATERTIGHT", 90)).write_text(library)
-        check_equal(ours.closest(rays), Accel(*mesh).closest(rays))
+        assert_same_bits(ours.closest(rays), Accel(*mesh).closest(rays))
         monkeypatch.undo()
 
 
@@ -248,9 +221,9 @@ def test_an_architecture_that_the_build_did_not_know_takes_ptx(monkeypatch: pyte
 def test_lanes_of_the_wide_tree_keep_out_of_each_others_shared_memory(tmp_path: Path, precision: Any) -> None:
     """With every thread's arrays apart the hits are the same: no thread reads what another wrote, none can race."""
     mesh = HARD_MESHES["soup"]
-    rays = some_rays(mesh, FIBERS)
+    rays = device_rays(mesh, FIBERS)
     cpu = Accel(*mesh, kind="CWBVH", precision=precision)
     with cuda_on_cpu.standing_in(tmp_path, shares_memory=False):
         ours = Accel(*mesh, kind="CWBVH", precision=precision, device="CUDA")
-        check_equal(ours.closest(rays), cpu.closest(rays))
+        assert_same_bits(ours.closest(rays), cpu.closest(rays))
         assert np.array_equal(ours.any(rays), cpu.any(rays))

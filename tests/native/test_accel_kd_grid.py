@@ -6,77 +6,11 @@ import numpy as np
 import pytest
 from luch._native import core
 from luch.accel import Accel, Kind
-from numpy.typing import NDArray
-from support.accel_meshes import F32, HARD_MESHES, Mesh, aimed_rays, icosphere, random_rays, rows, separate, soup
+from support.accel_meshes import Mesh, aimed_rays, icosphere, random_rays, rows, separate, soup
+from support.hard_rays import OF_CELLS, assert_same_hits, hard_rays
 
 KINDS: tuple[Kind, ...] = ("KD_TREE", "GRID", "HIERARCHICAL_GRID")
 RAYS = 1500
-EXTRA_MESHES: dict[str, Mesh] = {
-    "cube of large triangles": separate(3 * np.random.default_rng(5).uniform(-1, 1, (60, 3, 3))),
-    "sticks": separate(
-        np.random.default_rng(6).uniform(-1, 1, (900, 1, 3))
-        + np.random.default_rng(7).normal(size=(900, 3, 3)) * np.array([[0], [0.01], [0.8]])
-    ),
-}
-MESHES = HARD_MESHES | EXTRA_MESHES
-NEEDLES = ("collinear", "points")
-
-
-def axis_rays(mesh: Mesh, count: int, seed: int = 5) -> F32:
-    """Along an axis, the other components +0 or -0, through coordinates of vertices: in the planes of the cells."""
-    rng = np.random.default_rng(seed)
-    points = mesh[0]
-    middle = points.mean(0, dtype=np.float64)
-    size = np.abs(points - middle).max()
-    origin = points[rng.integers(len(points), size=(count, 3)), np.arange(3)].astype(np.float64)
-    axis = np.arange(3) == rng.integers(3, size=(count, 1))
-    origin = np.where(axis, middle + size * rng.uniform(-2, 2, (count, 3)), origin)
-    direction = np.where(axis, rng.choice([-1.0, 1.0], (count, 3)), rng.choice([0.0, -0.0], (count, 3)))
-    return rows(origin.astype(np.float32), direction)
-
-
-def far_rays(mesh: Mesh, count: int, distance: float = 1e4, seed: int = 6) -> F32:
-    """Aimed at the mesh from `distance` times its size away."""
-    rays = aimed_rays(mesh, count, seed)
-    target = (rays[:, :3] + rays[:, 4:7]).astype(np.float64)
-    size = max(np.abs(mesh[0] - mesh[0].mean(0, dtype=np.float64)).max(), 1e-30)
-    way = np.random.default_rng(seed).normal(size=(count, 3))
-    origin = (target + distance * size * way).astype(np.float32)
-    return rows(origin, target - origin)
-
-
-def short_rays(mesh: Mesh, count: int) -> F32:
-    """Aimed rays whose intervals begin and end somewhere along the way."""
-    rng = np.random.default_rng(8)
-    rays = aimed_rays(mesh, count, 9)
-    rays[:, 3], rays[:, 7] = rng.uniform(-0.5, 1, count), rng.uniform(0.5, 2, count)
-    return rays
-
-
-def hard_rays(mesh: Mesh, count: int = RAYS) -> F32:
-    """Rays of every kind."""
-    makers = (aimed_rays, axis_rays, far_rays, short_rays)
-    return np.concatenate([random_rays(count), *(make(mesh, count) for make in makers)])
-
-
-def assert_hits_are_brute_forces(mesh: Mesh, rays: F32, kind: Kind, spheres: NDArray[np.float32] | None = None) -> int:
-    """Compares every bit of t, primitive, u, v, and any-hit; returns how many rays hit."""
-    ours = Accel(*mesh, kind=kind, spheres=spheres, threads=1)
-    truth = Accel(*mesh, kind="BRUTE_FORCE", spheres=spheres, threads=1)
-    expected = truth.closest(rays)
-    differ = np.zeros(len(rays), bool)
-    for a, b in zip(ours.closest(rays), expected, strict=True):
-        differ |= a.view(np.uint32) != b.view(np.uint32)
-    assert int(differ.sum()) == 0, rays[differ][:3]
-    assert np.array_equal(ours.any(rays), expected[1] >= 0)
-    return int((expected[1] >= 0).sum())
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", MESHES)
-def test_hits_are_bit_equal_to_brute_force(name: str, kind: Kind) -> None:
-    hit = assert_hits_are_brute_forces(MESHES[name], hard_rays(MESHES[name]), kind)
-    assert hit > 0 or name in NEEDLES, "these rays prove nothing"
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -84,7 +18,7 @@ def test_hits_are_bit_equal_to_brute_force(name: str, kind: Kind) -> None:
 def test_hits_are_bit_equal_to_brute_force_at_any_scale(scale: float, kind: Kind) -> None:
     points, triangles = soup(300)
     mesh = ((points * scale).astype(np.float32), triangles)
-    assert assert_hits_are_brute_forces(mesh, hard_rays(mesh, 1000), kind) > 1000
+    assert assert_same_hits(Accel(*mesh, kind=kind, threads=1), mesh, hard_rays(mesh, 1000)) > 1000
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -92,7 +26,7 @@ def test_hits_are_bit_equal_to_brute_force_at_any_scale(scale: float, kind: Kind
 def test_hits_are_bit_equal_to_brute_force_far_from_the_origin(distance: float, kind: Kind) -> None:
     points, triangles = soup(300)
     mesh = ((points * 10 + np.float32([1, 0.7, -1.3]) * distance).astype(np.float32), triangles)
-    assert assert_hits_are_brute_forces(mesh, hard_rays(mesh, 1000), kind) > 1000
+    assert assert_same_hits(Accel(*mesh, kind=kind, threads=1), mesh, hard_rays(mesh, 1000)) > 1000
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -100,7 +34,7 @@ def test_spheres_among_triangles_are_hit_as_by_brute_force(kind: Kind) -> None:
     rng = np.random.default_rng(4)
     spheres = np.concatenate([rng.uniform(-1, 1, (300, 3)), rng.exponential(0.05, (300, 1))], 1).astype(np.float32)
     mesh = soup(200, 0.1)
-    assert assert_hits_are_brute_forces(mesh, hard_rays(mesh), kind, spheres) > 1000
+    assert assert_same_hits(Accel(*mesh, kind=kind, spheres=spheres, threads=1), mesh, hard_rays(mesh), spheres) > 1000
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -171,7 +105,7 @@ def test_builder_finishes_with_a_bounded_structure_on(name: str, kind: Kind) -> 
     assert stats["bytes"] <= 76 * MANY + 2**18  # 12 refs and 7 cells a primitive, and what small grids may have
     assert stats["depth"] <= 60
     rays = aimed_rays(mesh, 100)
-    assert_hits_are_brute_forces(mesh, rays, kind)
+    assert_same_hits(Accel(*mesh, kind=kind, threads=1), mesh, rays)
 
 
 def test_kd_tree_tests_few_primitives() -> None:
@@ -184,7 +118,7 @@ def test_kd_tree_tests_few_primitives() -> None:
 
 @pytest.mark.parametrize("name", ["soup", "sphere", "sticks", "size 2^-i", "duplicates"])
 def test_kd_tree_walked_with_a_stack_of_two_finds_the_same_hits(name: str) -> None:
-    mesh = MESHES[name]
+    mesh = OF_CELLS[name]
     rays = hard_rays(mesh, 600)
     rays = rays[np.abs(rays[:, 4:7]).max(1) > 0]
     rays[:, 3], rays[:, 7] = np.maximum(rays[:, 3], 0), np.minimum(rays[:, 7], 3e38)
@@ -236,4 +170,4 @@ def test_teapot_in_a_stadium_costs_the_hierarchical_grid_and_the_kd_tree_little(
     assert tests["HIERARCHICAL_GRID"] <= 25  # 22.1
     assert tests["GRID"] >= 20_000  # 20,480: the whole teapot, in one cell
     for kind in ("KD_TREE", "HIERARCHICAL_GRID"):
-        assert_hits_are_brute_forces(mesh, np.concatenate([rays[:200], hard_rays(mesh, 60)]), kind)
+        assert_same_hits(Accel(*mesh, kind=kind, threads=1), mesh, np.concatenate([rays[:200], hard_rays(mesh, 60)]))

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 from luch.accel import QUALITIES, Accel, Kind, Quality
 from support.accel_meshes import (
-    F32,
-    HARD_MESHES,
     Mesh,
     aimed_rays,
     cube,
@@ -20,6 +17,7 @@ from support.accel_meshes import (
     separate,
     soup,
 )
+from support.hard_rays import OF_TREES, axis_rays, bits_differ, truth
 
 RAYS = 800  # of each sort
 KINDS: tuple[Kind, ...] = ("BVH2", "BVH2_STACKLESS", "CWBVH")
@@ -27,70 +25,6 @@ TREES = [(kind, quality) for kind in KINDS for quality in QUALITIES]
 every_tree = pytest.mark.parametrize(("kind", "quality"), TREES, ids=[f"{k}-{q}" for k, q in TREES])
 ONE_EACH = [tree for tree in TREES if tree[1] == "NORMAL"]
 every_kind = pytest.mark.parametrize(("kind", "quality"), ONE_EACH, ids=[k for k, _ in ONE_EACH])
-
-
-def scaled(scale: float) -> Mesh:
-    points, triangles = soup()
-    return (points * np.float64(scale)).astype(np.float32), triangles
-
-
-def moved(distance: float) -> Mesh:
-    points, triangles = soup()
-    return (points * 10 + np.float32([1, 0.7, -1.3]) * distance).astype(np.float32), triangles
-
-
-MESHES: dict[str, Mesh] = {
-    **HARD_MESHES,
-    "1e-30": scaled(1e-30),
-    "1e-18": scaled(1e-18),
-    "1e-3": scaled(1e-3),
-    "1e18": scaled(1e18),
-    "1e36": scaled(1e36),
-    "1e3 away": moved(1e3),
-    "1e5 away": moved(1e5),
-    "1e7 away": moved(1e7),
-}
-
-
-def axis_rays(mesh: Mesh, count: int) -> F32:
-    """Along the axes, other components 0 or -0, two coordinates of the origin a vertex's."""
-    rng = np.random.default_rng(4)
-    points = mesh[0]
-    target = points[rng.integers(len(points), size=count)]
-    size = np.abs(points - points.mean(0, dtype=np.float64)).max()
-    axis = np.arange(3) == rng.integers(3, size=(count, 1))
-    sign = rng.choice([-1.0, 1.0], (count, 1))
-    direction = np.where(axis, sign * size, rng.choice([0.0, -0.0], (count, 3)))
-    return rows(np.where(axis, target - sign * 2 * size * rng.random((count, 1)), target), direction)
-
-
-@cache
-def truth(name: str) -> tuple[F32, tuple[np.ndarray[Any, Any], ...]]:
-    """Rays for a mesh, and what brute force says: t, prim, u, v, blocked."""
-    mesh = MESHES[name]
-    middle, size = mesh[0].mean(0, dtype=np.float64), np.abs(mesh[0]).max()
-    scattered = random_rays(RAYS, scale=size)
-    scattered[:, :3] += middle.astype(np.float32) if "away" in name else np.float32(0)
-    rays = np.concatenate([scattered, aimed_rays(mesh, RAYS), axis_rays(mesh, RAYS)])
-    oracle = Accel(*mesh, kind="BRUTE_FORCE")
-    return rays, (*oracle.closest(rays), oracle.blocked(rays))
-
-
-def bits_differ(ours: tuple[Any, ...], theirs: tuple[Any, ...]) -> int:
-    """Rays of which any result differs in any bit."""
-    differ = np.zeros(len(ours[0]), bool)
-    for a, b in zip(ours, theirs, strict=True):
-        differ |= (a != b) if a.dtype == np.uint8 else (a.view(np.uint32) != b.view(np.uint32))
-    return int(differ.sum())
-
-
-@every_tree
-@pytest.mark.parametrize("name", MESHES)
-def test_tree_hits_are_bit_equal_to_brute_force(name: str, kind: Kind, quality: Quality) -> None:
-    rays, expected = truth(name)
-    tree = Accel(*MESHES[name], kind=kind, quality=quality)
-    assert bits_differ((*tree.closest(rays), tree.blocked(rays)), expected) == 0
-    assert (expected[1] >= 0).sum() > 600 or name in ("collinear", "points"), "these rays prove nothing"
 
 
 @every_tree
@@ -116,14 +50,14 @@ def test_spheres_among_triangles_are_hit_as_by_brute_force(kind: Kind, quality: 
 @every_kind
 def test_double_precision_gives_the_hits_of_brute_force_in_double(kind: Kind, quality: Quality) -> None:
     rays, _ = truth("slivers")
-    tree, oracle = (Accel(*MESHES["slivers"], k, "DOUBLE", quality=quality) for k in (kind, "BRUTE_FORCE"))
+    tree, oracle = (Accel(*OF_TREES["slivers"], k, "DOUBLE", quality=quality) for k in (kind, "BRUTE_FORCE"))
     assert bits_differ(tree.closest(rays), oracle.closest(rays)) == 0
 
 
 @every_kind
 def test_single_precision_finds_nearly_all_hits(kind: Kind, quality: Quality) -> None:
     rays, _ = truth("soup")
-    tree, oracle = (Accel(*MESHES["soup"], k, "FAST", quality=quality) for k in (kind, "BRUTE_FORCE"))
+    tree, oracle = (Accel(*OF_TREES["soup"], k, "FAST", quality=quality) for k in (kind, "BRUTE_FORCE"))
     assert bits_differ(tree.closest(rays), oracle.closest(rays)) <= 4  # 0 measured: edges of boxes and triangles
 
 
@@ -149,7 +83,9 @@ def test_closed_mesh_lets_no_ray_through(name: str, kind: Kind, quality: Quality
 def test_transparent_blockers_are_told_from_opaque_ones(kind: Kind, quality: Quality) -> None:
     rays, _ = truth("soup")
     flags = np.random.default_rng(8).random(600) < 0.7
-    tree, oracle = (Accel(*MESHES["soup"], k, quality=quality, may_be_transparent=flags) for k in (kind, "BRUTE_FORCE"))
+    tree, oracle = (
+        Accel(*OF_TREES["soup"], k, quality=quality, may_be_transparent=flags) for k in (kind, "BRUTE_FORCE")
+    )
     expected = oracle.blocked(rays)
     assert (tree.blocked(rays) == expected).all()
     assert set(expected) == {0, 1, 2}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from luch import core
 from numpy.typing import NDArray
-from scipy import stats
+from support.fibres import sphere, view
 
 Floats = NDArray[np.float64]
 SAMPLES, ROWS, COLUMNS = 40_000, 16, 24
@@ -19,22 +19,6 @@ def fibre(**inputs: Any) -> Any:
     """Principled Hair along x, seen from 25 degrees off its normal plane and where h is not 0."""
     given = {"absorption": 0.0, "offset": 0.0349, "roughness": 0.3, "radial_roughness": 0.3, **inputs}
     return core.bsdf.Closures("principled_hair", given, **view(25.0, given.pop("lean", 30.0)))
-
-
-def view(degrees: float, lean: float) -> dict[str, Any]:
-    a, b = math.radians(degrees), math.radians(lean)
-    normal = (0.0, 0.0, 1.0)
-    wo = (math.sin(a), math.cos(a) * math.sin(b), math.cos(a) * math.cos(b))
-    return {"wo": wo, "n": normal, "ng": normal}
-
-
-def sphere(rows: int = 192, columns: int = 384) -> tuple[Any, Any]:
-    """Directions at equal angles from the axis x, which is the fibre's, and around it; the solid angle of each."""
-    theta = ((np.arange(rows) + 0.5) / rows - 0.5) * np.pi
-    phi = (np.arange(columns) + 0.5) / columns * 2.0 * np.pi
-    gt, gp = np.meshgrid(theta, phi, indexing="ij")
-    w = np.stack([np.sin(gt), np.cos(gt) * np.cos(gp), np.cos(gt) * np.sin(gp)], -1).reshape(-1, 3)
-    return w.astype(np.float32), (np.cos(gt) * np.pi / rows * 2.0 * np.pi / columns).ravel()
 
 
 @pytest.mark.parametrize("roughness", [0.15, 0.3, 0.6, 1.0])
@@ -56,53 +40,6 @@ def test_samples_of_a_fibre_lose_nothing_however_sharp_it_is(roughness: float) -
     assert np.allclose(drawn["throughput"], 1.0, atol=1e-4)
 
 
-LOBES: dict[str, tuple[str, dict[str, Any]]] = {
-    "fibre": ("principled_hair", {"absorption": (0.2, 0.5, 1.3)}),
-    "rough fibre": ("principled_hair", {"roughness": 0.7, "radial_roughness": 0.8, "coat": 0.6, "pigments": True}),
-    "tilted fibre": ("principled_hair", {"offset": 0.2, "ior": 1.3, "roughness": 0.4, "radial_roughness": 0.5}),
-    "reflection": ("hair", {"offset": 0.1, "roughness_along": 0.3, "roughness_around": 0.6}),
-    "transmission": ("hair", {"transmission": True, "roughness_along": 0.4, "roughness_around": 0.5}),
-}
-
-
-@pytest.mark.parametrize("lean", [5.0, 70.0])
-@pytest.mark.parametrize("degrees", [0.0, 40.0])
-@pytest.mark.parametrize("name", LOBES)
-def test_samples_follow_their_density(name: str, degrees: float, lean: float) -> None:
-    node, inputs = LOBES[name]
-    c = core.bsdf.Closures(node, inputs, **view(degrees, lean))
-    drawn = c.sample(np.random.default_rng(7).random((SAMPLES, 3), dtype=np.float32))
-    fine = 12
-    w, solid_angle = sphere(ROWS * fine, COLUMNS * fine)
-    mass = (c.eval(w)[1].astype(float) * solid_angle).reshape(ROWS, fine, COLUMNS, fine)
-    expected = mass.sum(axis=(1, 3)).ravel() * SAMPLES
-    d = drawn["direction"][drawn["pdf"] > 0.0]
-    row = np.clip(((np.arcsin(np.clip(d[:, 0], -1.0, 1.0)) / np.pi + 0.5) * ROWS).astype(int), 0, ROWS - 1)
-    column = (np.arctan2(d[:, 2], d[:, 1]) / (2.0 * np.pi) % 1.0 * COLUMNS).astype(int) % COLUMNS
-    observed = np.bincount(row * COLUMNS + column, minlength=ROWS * COLUMNS)
-    expected = np.append(expected, max(SAMPLES - expected.sum(), 0.0))  # draws that found no direction
-    observed = np.append(observed, SAMPLES - observed.sum())
-    order = np.argsort(expected)
-    expected, observed = expected[order], observed[order]
-    small = int(np.searchsorted(expected, 10.0))
-    expected = np.append(expected[small:], expected[:small].sum())
-    observed = np.append(observed[small:], observed[:small].sum())
-    slack = 0.01 * expected + 0.004 * SAMPLES / len(expected)  # of the midpoint rule
-    chi2 = float((np.maximum(np.abs(observed - expected) - slack, 0.0) ** 2 / np.maximum(expected, 1.0)).sum())
-    assert stats.chi2.sf(chi2, len(expected) - 1) > 0.01 / 20, (chi2, len(expected))
-
-
-@pytest.mark.parametrize("name", LOBES)
-def test_sampling_and_evaluation_agree(name: str) -> None:
-    node, inputs = LOBES[name]
-    c = core.bsdf.Closures(node, inputs, **view(20.0, 40.0))
-    drawn = c.sample(np.random.default_rng(8).random((3000, 3), dtype=np.float32))
-    kept = drawn["pdf"] > 1e-3
-    light, pdf = c.eval(drawn["direction"][kept])
-    assert np.quantile(np.abs(pdf / drawn["pdf"][kept] - 1.0), 0.98) < 5e-3
-    assert np.quantile(np.abs(light.sum(axis=1) / pdf[:, None] - drawn["throughput"][kept]), 0.98) < 5e-3
-
-
 @pytest.mark.parametrize(
     ("node", "name", "low", "high"),
     [("principled_hair", "roughness", 0.1, 1.0), ("principled_hair", "radial_roughness", 0.1, 1.0),
@@ -113,7 +50,7 @@ def test_lobes_are_continuous(node: str, name: str, low: float, high: float) -> 
     draws = np.random.default_rng(9).random((2048, 3), dtype=np.float32)
 
     def moments(value: float) -> Any:
-        drawn = core.bsdf.Closures(node, {**LOBES["fibre"][1], name: value} if "_" in node else {name: value},
+        drawn = core.bsdf.Closures(node, {"absorption": (0.2, 0.5, 1.3), name: value} if "_" in node else {name: value},
                                    **view(20.0, 40.0)).sample(draws)  # fmt: skip
         light = drawn["throughput"].astype(float).mean(axis=1, keepdims=True)
         return np.concatenate([light, light * drawn["direction"]], axis=1).mean(axis=0)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import core
-
-from tests.support.lights import (
+from support.lights import (
     IDENTITY,
     TRIANGLE,
     WORLD,
@@ -37,49 +36,6 @@ def quad_lights(count: int, seed: int = 5, **rest: Any) -> Any:
     triangles = (base + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     mesh = {"positions": positions.astype(np.float32), "triangles": triangles.astype(np.uint32), "emission_sampling": 1}
     return core.light.TestLights(meshes=[mesh], instances=[{"matrix": IDENTITY, "mesh": 0}], **rest)
-
-
-@pytest.mark.parametrize("edge", [1e-3, 1e-2, 0.1, 1.0, 30.0, 1e3])
-@pytest.mark.parametrize("height", [1e-3, 0.1, 1.0, 10.0])
-def test_triangle_light_gives_lamberts_polygon_formula(edge: float, height: float) -> None:
-    h = height * edge
-    corners = np.array([[-edge / 2, -edge / 3, h], [edge / 2, -edge / 3, h], [0.1 * edge, edge / 2, h]])
-    truth = polygon_irradiance(corners, ORIGIN, UP)
-    estimate = contributions(mesh_light(corners), ORIGIN, UP, 1 << 15)
-    assert estimate.mean() == pytest.approx(truth, rel=2e-4)
-    assert estimate.std() < 1.2 * truth
-
-
-def test_noise_of_a_triangle_light_does_not_depend_on_scale() -> None:
-    shape = np.array([[-1, -0.5, 0.8], [0.9, -0.4, 0.8], [0.1, 0.7, 0.8]])
-    noise = [contributions(mesh_light(shape * s), ORIGIN, UP).std() for s in (1e-3, 1.0, 1e3)]
-    assert max(noise) / min(noise) < 1.01
-
-
-@pytest.mark.parametrize("p", [(0.2, 0.1, 0.0), (0.2, 0.1, 0.8), (4.0, 1.0, 0.5), (-30.0, 0.0, 0.0)])
-def test_triangle_samples_are_uniform_in_their_density(p: tuple[float, float, float]) -> None:
-    """Counts of samples in sixteen equal-area cells of the triangle against the integral of the density."""
-    corners = np.array([[-1, -1, 1], [1, -1, 1], [0, 1.5, 1]], float)
-    lights = mesh_light(corners)
-    count = 1 << 14
-    s = lights.sample(rows(p, count), rows(UP, count), False, numbers(count))
-    assert (s["kind"] == TRIANGLE).all()
-    cells = np.floor(np.clip(s["uv"], 0, 0.9999) * 4).astype(int)
-    drawn = np.bincount(cells[:, 0] * 4 + cells[:, 1], minlength=16) / count
-    fine = (np.stack(np.meshgrid(np.arange(400), np.arange(400)), -1).reshape(-1, 2) + 0.5) / 400
-    fine = fine[fine.sum(1) < 1]
-    points = corners[0] + fine[:, :1] * (corners[1] - corners[0]) + fine[:, 1:] * (corners[2] - corners[0])
-    along = points - np.array(p)
-    distance = np.linalg.norm(along, axis=1)
-    direction = (along / distance[:, None]).astype(np.float32)
-    zeros = np.zeros(len(fine), np.uint32)
-    pdf = lights.pdf_triangle(rows(p, len(fine)), rows(UP, len(fine)), False, zeros, zeros, direction, distance)
-    mass = pdf * direction[:, 2] / distance**2  # steradians to area: all cells are alike
-    at = np.floor(fine * 4).astype(int)
-    expected = np.bincount(at[:, 0] * 4 + at[:, 1], weights=mass, minlength=16)
-    np.testing.assert_allclose(drawn, expected / expected.sum(), atol=4e-3)
-    area = 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
-    assert mass.mean() * area == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.parametrize(("side", "lit"), [(1, "below"), (2, "above"), (3, "both")])
@@ -167,27 +123,6 @@ def test_a_thousand_lamps_are_chosen_five_times_better_than_evenly() -> None:
         assert a.mean() == pytest.approx(b.mean(), rel=0.5)
         ratios.append((b.std() / b.mean()) / (a.std() / a.mean()))
     assert np.median(ratios) > 5  # 6.5 measured: forty times fewer samples for the same noise
-
-
-@pytest.mark.parametrize("normal", [UP, ORIGIN])
-@pytest.mark.parametrize("transmits", [False, True])
-@pytest.mark.parametrize("sun", [False, True])
-def test_world_density_integrates_to_one_and_is_that_of_its_samples(normal: Any, transmits: bool, sun: bool) -> None:
-    rng = np.random.default_rng(2)
-    picture = rng.uniform(0, 1, (16, 32, 3)).astype(np.float32)
-    picture[3, 31] = 40.0
-    extra = {"has_sun": sun, "sun_direction": [0.6, 0.0, 0.8], "sun_angle": 0.3, "sun_radiance": [20.0] * 3}
-    for world in ({"map": picture}, {"radiance": [1.0, 1.0, 1.0]}):
-        lights = core.light.TestLights(world=world | extra)
-        d = sphere_directions(1 << 17)
-        pdf = lights.pdf_world(rows(ORIGIN, len(d)), rows(normal, len(d)), transmits, d)
-        assert pdf.mean() * 4 * math.pi == pytest.approx(1.0, abs=3e-3)
-        count = 1 << 14
-        s = lights.sample(rows(ORIGIN, count), rows(normal, count), transmits, numbers(count))
-        again = lights.pdf_world(rows(ORIGIN, count), rows(normal, count), transmits, s["direction"])
-        np.testing.assert_allclose(again, s["pdf"], rtol=2e-3)
-        moment = (pdf.astype(float)[:, None] * 4 * math.pi * d).mean(0)
-        np.testing.assert_allclose(s["direction"].mean(0), moment, atol=4e-3)
 
 
 def test_a_hot_texel_is_sampled_in_proportion_to_its_tent() -> None:

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from luch import core
-from scipy import stats
-
-from tests.support.lights import (
+from support.lights import (
     LAMP,
+    LAMPS,
     NOWHERE,
+    TURN,
     cone_directions,
     contributions,
     irradiance,
@@ -21,34 +20,11 @@ from tests.support.lights import (
     polygon_irradiance,
     rows,
     sphere_directions,
+    store,
 )
 
 UP = (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
-TURN = [0.8, 0.36, -0.48, 0.3, 0.0, 0.8, 0.6, -0.2, 0.6, -0.48, 0.64, 1.5]  # a rotation and a place
-
-
-def store(*lamps: dict[str, Any], **rest: Any) -> Any:
-    return core.light.TestLights(lamps=list(lamps), **rest)
-
-
-LAMPS: dict[str, dict[str, Any]] = {
-    "sphere": {"shape": "POINT", "radius": 0.3, "soft_falloff": False},
-    "sphere around the point": {"shape": "POINT", "radius": 3.0, "soft_falloff": False},
-    "soft disk": {"shape": "POINT", "radius": 0.3},
-    "spot": {"shape": "SPOT", "radius": 0.3, "soft_falloff": False, "spot_size": 1.2},
-    "narrow large spot": {"shape": "SPOT", "radius": 1.0, "soft_falloff": False, "spot_size": 0.6},
-    "soft spot": {"shape": "SPOT", "radius": 0.2, "spot_size": 2.0, "spot_blend": 1.0},
-    "square": {"shape": "SQUARE", "size": 0.7},
-    "small square": {"shape": "SQUARE", "size": 0.01},
-    "large rectangle": {"shape": "RECTANGLE", "size": 30.0, "size_y": 7.0},
-    "disk": {"shape": "DISK", "size": 0.4},
-    "large ellipse": {"shape": "ELLIPSE", "size": 4.0, "size_y": 2.0},
-    "square with spread": {"shape": "SQUARE", "size": 1.0, "spread": 0.8},
-    "ellipse with spread": {"shape": "ELLIPSE", "size": 3.0, "size_y": 1.0, "spread": 0.5},
-    "sun": {"shape": "SUN", "angle": 0.5},
-    "half sky": {"shape": "SUN", "angle": math.pi},
-}
 
 
 @pytest.mark.parametrize("radius", [0.0, 1e-10, 1e-7, 1e-3])
@@ -154,44 +130,6 @@ def test_moments_of_samples_are_those_of_the_density(lamp: dict[str, Any]) -> No
     weight = np.where(lit, h["pdf"], 0.0) * 2 * math.pi * gap
     assert weight.mean() == pytest.approx(used.mean(), rel=0.01)
     np.testing.assert_allclose((weight[:, None] * d).mean(0), mean * used.mean(), atol=0.01)
-
-
-@pytest.mark.parametrize("lamp", LAMPS.values(), ids=LAMPS.keys())
-def test_samples_of_a_lamp_follow_their_density(lamp: dict[str, Any]) -> None:
-    """Chi-square over bins of the cone that holds the lamp."""
-    lights = store(lamp | {"matrix": TURN})
-    shines = np.array([0.48, -0.6, -0.64])  # TURN's -z
-    p, n = np.array([0.3, -0.2, 1.5]) + 1.2 * shines + [0.1, 0.2, 0.05], -shines
-    count, rows_of_bins, columns = 1 << 14, 6, 8
-    draws = np.random.default_rng(41).random((count, 3), dtype=np.float32)
-    s = lights.sample(rows(p, count), rows(n, count), False, draws)
-    drawn = s["direction"][s["kind"] == LAMP].astype(float)
-    mean = drawn.mean(0)
-    axis = mean / np.linalg.norm(mean)
-    gap = min(2.0, 1.1 * float(1.0 - (drawn @ axis).min()))
-    d = cone_directions(axis, gap, 1 << 17)
-    h = lights.hit(rows(p, len(d)), rows(n, len(d)), False, d, sun=0 if lamp["shape"] == "SUN" else -1)
-    lit = (h["lamp"] == 0) & (h["radiance"][:, 0] > 0)
-    mass = np.where(lit, h["pdf"].astype(float), 0.0) * 2 * math.pi * gap / len(d) * count
-    x = np.cross(axis, [0.3, 0.9, -0.1])
-    x /= np.linalg.norm(x)
-    y = np.cross(axis, x)
-
-    def bins(direction: Any) -> Any:
-        row = np.clip(((1.0 - direction @ axis) / gap * rows_of_bins).astype(int), 0, rows_of_bins - 1)
-        turn = np.arctan2(direction @ y, direction @ x) / (2.0 * math.pi) % 1.0
-        return row * columns + np.minimum((turn * columns).astype(int), columns - 1)
-
-    expected = np.bincount(bins(d.astype(float)), weights=mass, minlength=rows_of_bins * columns)
-    observed = np.bincount(bins(drawn), minlength=rows_of_bins * columns).astype(float)
-    expected = np.append(expected, max(count - expected.sum(), 0.0))  # draws that found no light
-    observed = np.append(observed, count - len(drawn))
-    wide = expected > 10.0
-    slack = 0.006 * expected + 0.0005 * count  # of the quadrature, at the lamp's rim above all
-    excess = np.maximum(np.abs(observed - expected) - slack, 0.0)[wide]
-    chi2 = float((excess**2 / expected[wide]).sum())
-    assert stats.chi2.sf(chi2, wide.sum() - 1) > 0.01 / len(LAMPS), (chi2, wide.sum())
-    assert observed[~wide].sum() <= expected[~wide].sum() + 0.004 * count
 
 
 @pytest.mark.parametrize(

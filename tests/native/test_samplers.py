@@ -1,4 +1,4 @@
-"""What each family of points promises, beside Sobol's (test_sampling)."""
+"""What each family of points promises, beside Sobol's (test_sampling, hard_cases/test_sampler)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 from luch import core, samplers
 from numpy.typing import NDArray
 from scipy import stats
+from support.points import block, counts
 
 sampling = core.sampling
 F64 = NDArray[np.float64]
@@ -19,16 +20,6 @@ EVERY = [pytest.param(SOBOL, id="sobol"), *OTHERS]
 FIRSTS = [0, 1 << 12, 1 << 31, 2**32 - (1 << 10)]
 LATTICE_Y, LATTICE_Z = 3797975533, 753387963
 LEAST_DISTANCE = 0.465  # of the lattices of any two coordinates, over the best of as many points
-
-
-def block(start: int, count: int) -> NDArray[np.uint32]:
-    return np.arange(start, start + count, dtype=np.uint32)
-
-
-def counts(points: NDArray[np.float32], *sides: int) -> NDArray[np.int64]:
-    """How many points fall in each box of a grid."""
-    cells = [np.floor(points[:, k].astype(np.float64) * side).astype(np.int64) for k, side in enumerate(sides)]
-    return np.bincount(np.ravel_multi_index(cells, sides), minlength=int(np.prod(sides)))
 
 
 def test_the_names_are_in_the_order_of_the_core() -> None:

@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from luch import core
 from luch.scene import Camera, Material
 
 from support.accel_meshes import icosphere
+from support.closures import closures, reflectance
 from support.hard_geometry import quad
 from support.hard_scenes import glass, looking, mesh_of, picture, scene_of
 
@@ -34,10 +34,5 @@ def closed_glass_energy(roughness: float, samples: int = 48, **settings: Any) ->
 
 def closure_energy(node: str, inputs: dict[str, Any], degrees: float, count: int = 1 << 16) -> float:
     """The same of a node's closures alone, by a lattice of samples: the channel that is farthest from 1."""
-    a = math.radians(degrees)
-    closures = core.bsdf.Closures(node, inputs, wo=(math.sin(a), 0.0, math.cos(a)))
-    i = np.arange(count) + 0.5
-    steps = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
-    u = np.minimum(np.stack([(i * s) % 1.0 for s in steps], axis=1), 0.99999994).astype(np.float32)
-    energy = np.asarray(closures.sample(u)["throughput"], dtype=float).mean(axis=0)
+    energy = reflectance(closures(node, inputs, degrees), count)
     return float(energy[np.argmax(np.abs(energy - 1.0))])

@@ -80,3 +80,29 @@ def polygon_irradiance(corners: Any, p: Any, n: Any) -> float:
         if length > 0.0:
             total += normal / length * math.atan2(length, float(a @ b))
     return abs(float(total @ np.asarray(n, float))) / 2.0
+
+
+TURN = [0.8, 0.36, -0.48, 0.3, 0.0, 0.8, 0.6, -0.2, 0.6, -0.48, 0.64, 1.5]  # a rotation and a place
+
+
+def store(*lamps: dict[str, Any], **rest: Any) -> Any:
+    return core.light.TestLights(lamps=list(lamps), **rest)
+
+
+LAMPS: dict[str, dict[str, Any]] = {
+    "sphere": {"shape": "POINT", "radius": 0.3, "soft_falloff": False},
+    "sphere around the point": {"shape": "POINT", "radius": 3.0, "soft_falloff": False},
+    "soft disk": {"shape": "POINT", "radius": 0.3},
+    "spot": {"shape": "SPOT", "radius": 0.3, "soft_falloff": False, "spot_size": 1.2},
+    "narrow large spot": {"shape": "SPOT", "radius": 1.0, "soft_falloff": False, "spot_size": 0.6},
+    "soft spot": {"shape": "SPOT", "radius": 0.2, "spot_size": 2.0, "spot_blend": 1.0},
+    "square": {"shape": "SQUARE", "size": 0.7},
+    "small square": {"shape": "SQUARE", "size": 0.01},
+    "large rectangle": {"shape": "RECTANGLE", "size": 30.0, "size_y": 7.0},
+    "disk": {"shape": "DISK", "size": 0.4},
+    "large ellipse": {"shape": "ELLIPSE", "size": 4.0, "size_y": 2.0},
+    "square with spread": {"shape": "SQUARE", "size": 1.0, "spread": 0.8},
+    "ellipse with spread": {"shape": "ELLIPSE", "size": 3.0, "size_y": 1.0, "spread": 0.5},
+    "sun": {"shape": "SUN", "angle": 0.5},
+    "half sky": {"shape": "SUN", "angle": math.pi},
+}

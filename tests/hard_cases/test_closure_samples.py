@@ -1,4 +1,7 @@
-"""Closure samples follow the density they claim: chi-square over the sphere, and sample against eval."""
+"""Closure samples follow the density they claim: chi-square over the sphere, and sample against eval.
+
+Numbers: the rows of the list of hard cases.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import core
-from numpy.typing import NDArray
 from scipy import stats
+from support.closures import BACKFACING, CAMERA, Floats
+from support.fibres import sphere, view
 
-Floats = NDArray[np.float64]
-CAMERA, BACKFACING = 1, 512
 SAMPLES = 60_000
 LATITUDES, LONGITUDES = 16, 24  # bins
 FINE_Z, FINE_PHI = 32, 12  # Gauss-Legendre points per bin
@@ -95,7 +97,7 @@ def observed_counts(drawn: dict[str, Any]) -> Floats:
 
 @pytest.mark.parametrize("degrees", ANGLES)
 @pytest.mark.parametrize("name", LOBES)
-def test_samples_follow_their_density(name: str, degrees: float) -> None:
+def test_41_samples_of_a_closure_follow_their_density(name: str, degrees: float) -> None:
     c = closures(name, degrees)
     drawn = c.sample(np.random.default_rng(7).random((SAMPLES, 3), dtype=np.float32))
     expected, observed = expected_counts(c).ravel(), observed_counts(drawn).ravel()
@@ -117,7 +119,7 @@ def test_samples_follow_their_density(name: str, degrees: float) -> None:
 
 @pytest.mark.parametrize("degrees", ANGLES)
 @pytest.mark.parametrize("name", LOBES)
-def test_sampling_and_evaluation_agree(name: str, degrees: float) -> None:
+def test_41_sampling_and_evaluation_of_a_closure_agree(name: str, degrees: float) -> None:
     c = closures(name, degrees)
     drawn = c.sample(np.random.default_rng(8).random((4000, 3), dtype=np.float32))
     kept = (drawn["pdf"] > 1e-4) & ~drawn["delta"] & (np.abs(drawn["direction"][:, 2]) > 1e-3)
@@ -126,3 +128,51 @@ def test_sampling_and_evaluation_agree(name: str, degrees: float) -> None:
     assert np.quantile(np.abs(pdf / drawn["pdf"][kept] - 1.0), 0.99) < 2e-3
     sent = light.sum(axis=1) / pdf[:, None]
     assert np.quantile(np.abs(sent - drawn["throughput"][kept]), 0.99) < 2e-3
+
+
+HAIR_SAMPLES, ROWS, COLUMNS = 40_000, 16, 24
+HAIRS: dict[str, tuple[str, dict[str, Any]]] = {
+    "fibre": ("principled_hair", {"absorption": (0.2, 0.5, 1.3)}),
+    "rough fibre": ("principled_hair", {"roughness": 0.7, "radial_roughness": 0.8, "coat": 0.6, "pigments": True}),
+    "tilted fibre": ("principled_hair", {"offset": 0.2, "ior": 1.3, "roughness": 0.4, "radial_roughness": 0.5}),
+    "reflection": ("hair", {"offset": 0.1, "roughness_along": 0.3, "roughness_around": 0.6}),
+    "transmission": ("hair", {"transmission": True, "roughness_along": 0.4, "roughness_around": 0.5}),
+}
+
+
+@pytest.mark.parametrize("lean", [5.0, 70.0])
+@pytest.mark.parametrize("degrees", [0.0, 40.0])
+@pytest.mark.parametrize("name", HAIRS)
+def test_41_samples_of_hair_follow_their_density(name: str, degrees: float, lean: float) -> None:
+    node, inputs = HAIRS[name]
+    c = core.bsdf.Closures(node, inputs, **view(degrees, lean))
+    drawn = c.sample(np.random.default_rng(7).random((HAIR_SAMPLES, 3), dtype=np.float32))
+    fine = 12
+    w, solid_angle = sphere(ROWS * fine, COLUMNS * fine)
+    mass = (c.eval(w)[1].astype(float) * solid_angle).reshape(ROWS, fine, COLUMNS, fine)
+    expected = mass.sum(axis=(1, 3)).ravel() * HAIR_SAMPLES
+    d = drawn["direction"][drawn["pdf"] > 0.0]
+    row = np.clip(((np.arcsin(np.clip(d[:, 0], -1.0, 1.0)) / np.pi + 0.5) * ROWS).astype(int), 0, ROWS - 1)
+    column = (np.arctan2(d[:, 2], d[:, 1]) / (2.0 * np.pi) % 1.0 * COLUMNS).astype(int) % COLUMNS
+    observed = np.bincount(row * COLUMNS + column, minlength=ROWS * COLUMNS)
+    expected = np.append(expected, max(HAIR_SAMPLES - expected.sum(), 0.0))  # draws that found no direction
+    observed = np.append(observed, HAIR_SAMPLES - observed.sum())
+    order = np.argsort(expected)
+    expected, observed = expected[order], observed[order]
+    small = int(np.searchsorted(expected, 10.0))
+    expected = np.append(expected[small:], expected[:small].sum())
+    observed = np.append(observed[small:], observed[:small].sum())
+    slack = 0.01 * expected + 0.004 * HAIR_SAMPLES / len(expected)  # of the midpoint rule
+    chi2 = float((np.maximum(np.abs(observed - expected) - slack, 0.0) ** 2 / np.maximum(expected, 1.0)).sum())
+    assert stats.chi2.sf(chi2, len(expected) - 1) > 0.01 / 20, (chi2, len(expected))
+
+
+@pytest.mark.parametrize("name", HAIRS)
+def test_41_sampling_and_evaluation_of_hair_agree(name: str) -> None:
+    node, inputs = HAIRS[name]
+    c = core.bsdf.Closures(node, inputs, **view(20.0, 40.0))
+    drawn = c.sample(np.random.default_rng(8).random((3000, 3), dtype=np.float32))
+    kept = drawn["pdf"] > 1e-3
+    light, pdf = c.eval(drawn["direction"][kept])
+    assert np.quantile(np.abs(pdf / drawn["pdf"][kept] - 1.0), 0.98) < 5e-3
+    assert np.quantile(np.abs(light.sum(axis=1) / pdf[:, None] - drawn["throughput"][kept]), 0.98) < 5e-3

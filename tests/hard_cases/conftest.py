@@ -1,0 +1,3 @@
+"""What the tests of hard cases share."""
+
+from support.kernel_place import place as place
