@@ -63,6 +63,11 @@ def ball_inside(radius: float, *, size: int, samples: int, albedo: float = BLACK
     return scene_of([mesh], [diffuse(albedo)], camera=camera, size=(2 * size, size), samples=samples, **settings)
 
 
+def camera_above(across: float) -> Camera:
+    """Straight down on the origin, `across` metres wide."""
+    return Camera(kind="ORTHO", matrix=looking((0.1, 0.2, 9.0), (0.1, 0.2, 0.0)), ortho_scale=across)
+
+
 def sun(elevation_degrees: float, strength: float = 3.0) -> Light:
     a = math.radians(elevation_degrees)
     matrix = looking((math.cos(a), 0.0, math.sin(a)), (0.0, 0.0, 0.0))
