@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from support import accel_meshes, closed_meshes
 from support.hard_scenes import glow, mesh_of, scene_of
 
+every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 KINDS = ["PERSP", "ORTHO", "EQUIRECTANGULAR"]
 
 
@@ -30,12 +31,14 @@ def picture(scene: Scene, name: str = "Combined") -> F32:
     return render(scene).passes[name]
 
 
-def furnace(camera: Camera, film: Film | None = None, samples: int = 4, strength: float = 1.0) -> Scene:
+def furnace(
+    camera: Camera, film: Film | None = None, samples: int = 4, strength: float = 1.0, device: str = "CPU"
+) -> Scene:
     return Scene(
         world=world(strength),
         camera=camera,
         film=film or Film(width=16, height=12),
-        settings=Settings(samples=samples, threads=1),
+        settings=Settings(samples=samples, threads=1, device=device),
     )
 
 
@@ -64,9 +67,10 @@ def with_wall(scene: Scene, z: float, size: float = 1e4) -> Scene:
     return scene
 
 
+@every_device
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (16384, 1), (1, 16384), (16384, 16)])
-def test_54_any_resolution_renders_in_its_shape_and_mean(width: int, height: int) -> None:
-    pixels = picture(furnace(Camera(), Film(width=width, height=height), samples=1, strength=0.25))
+def test_54_any_resolution_renders_in_its_shape_and_mean(width: int, height: int, device: str) -> None:
+    pixels = picture(furnace(Camera(), Film(width=width, height=height), samples=1, strength=0.25, device=device))
     assert pixels.shape == (height, width, 4)
     np.testing.assert_array_equal(pixels, np.broadcast_to(np.float32([0.25, 0.25, 0.25, 1.0]), pixels.shape))
 
@@ -95,14 +99,17 @@ CLIPS = [
 
 
 # A panorama clips by a sphere, which no wall can lie in.
+@every_device
 @pytest.mark.parametrize(
     ("kind", "start", "end", "sees_wall"),
     [(kind, *clip) for kind in KINDS for clip in CLIPS if not (kind == "EQUIRECTANGULAR" and clip[0] == 2.0)],
 )
-def test_55_clipping_is_all_or_nothing_and_finite(kind: str, start: float, end: float, sees_wall: bool) -> None:
+def test_55_clipping_is_all_or_nothing_and_finite(
+    kind: str, start: float, end: float, sees_wall: bool, device: str
+) -> None:
     camera = Camera(kind=kind, clip_start=start, clip_end=end, lens_mm=200.0, ortho_scale=1.0)
     camera.latitude, camera.longitude = (-0.1, 0.1), (-0.1, 0.1)
-    pixels = picture(with_wall(furnace(camera), -2.0))[..., 0]
+    pixels = picture(with_wall(furnace(camera, device=device), -2.0))[..., 0]
     assert np.isfinite(pixels).all()
     if sees_wall:
         assert (pixels < 0.5).all()
@@ -110,11 +117,13 @@ def test_55_clipping_is_all_or_nothing_and_finite(kind: str, start: float, end: 
         np.testing.assert_array_equal(pixels, 1.0)
 
 
-def test_55_a_slice_of_no_thickness_is_finite() -> None:
-    scene = with_wall(furnace(Camera(clip_start=2.0, clip_end=2.0)), -2.0)
+@every_device
+def test_55_a_slice_of_no_thickness_is_finite(device: str) -> None:
+    scene = with_wall(furnace(Camera(clip_start=2.0, clip_end=2.0), device=device), -2.0)
     assert np.isfinite(picture(scene)).all()
 
 
+@every_device
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "fields",
@@ -129,22 +138,23 @@ def test_55_a_slice_of_no_thickness_is_finite() -> None:
         {"sensor_width_mm": 1e-3},
     ],
 )
-def test_56_a_furnace_is_exactly_white_through_any_lens(kind: str, fields: dict[str, Any]) -> None:
-    pixels = picture(furnace(Camera(kind=kind, use_dof=True, blades=5, **fields)))
+def test_56_a_furnace_is_exactly_white_through_any_lens(kind: str, fields: dict[str, Any], device: str) -> None:
+    pixels = picture(furnace(Camera(kind=kind, use_dof=True, blades=5, **fields), device=device))
     np.testing.assert_array_equal(pixels, 1.0)
     ball = mesh_of("Ball", closed_meshes.moved(accel_meshes.icosphere(2), 1e6))  # which rays that are none do not meet
     camera = Camera(kind=kind, use_dof=True, blades=5, clip_end=1e9, **fields)
-    np.testing.assert_array_equal(picture(scene_of([ball], [glow(1.0)], camera=camera, world=0.0)), 1.0)
+    np.testing.assert_array_equal(picture(scene_of([ball], [glow(1.0)], camera=camera, world=0.0, device=device)), 1.0)
 
 
-def test_57_the_poles_of_a_panorama_are_even() -> None:
+@every_device
+def test_57_the_poles_of_a_panorama_are_even(device: str) -> None:
     builder = ProgramBuilder()
     _, _, up = builder.op3("POINT_POSITION", (), (float_word(0.0),) * 3)
     half = builder.constant(0.5)
     height = builder.op1("MATH_MULTIPLY_ADD", (up, half, half))
     builder.closure("CLOSURE_EMISSION", (height, height, height))
     camera = Camera(kind="EQUIRECTANGULAR", matrix=rotation_x(np.pi / 2))  # upright, as on the floor
-    scene = furnace(camera, Film(width=128, height=64), samples=16)
+    scene = furnace(camera, Film(width=128, height=64), samples=16, device=device)
     scene.world = World("World", builder.finish())
     rows = picture(scene)[..., 0]
     spread = np.ptp(rows[[0, -1]], axis=1)
@@ -153,10 +163,11 @@ def test_57_the_poles_of_a_panorama_are_even() -> None:
     assert rows[-1].mean() == pytest.approx(1.0, abs=2e-3) and rows[0].mean() == pytest.approx(0.0, abs=2e-3)
 
 
+@every_device
 @pytest.mark.parametrize("strength", [0.1, 1.0, 1e4])
 @pytest.mark.parametrize("samples", [1, 1024, 65536])
-def test_59_equal_samples_have_their_own_mean(strength: float, samples: int) -> None:
-    pixels = picture(furnace(Camera(), Film(width=2, height=2), samples=samples, strength=strength))
+def test_59_equal_samples_have_their_own_mean(strength: float, samples: int, device: str) -> None:
+    pixels = picture(furnace(Camera(), Film(width=2, height=2), samples=samples, strength=strength, device=device))
     error = np.abs(pixels[..., :3] / np.float32(strength) - 1).max()
     print(f"{samples} samples of {strength}: relative error {error:.1e}")
     assert error <= 1e-6
@@ -194,14 +205,16 @@ def test_60_merged_parts_vary_as_one(count: int = 1 << 14) -> None:
     assert whole.resolve()["Combined"].tobytes() == parts.resolve()["Combined"].tobytes()
 
 
-@pytest.mark.parametrize("strength", [1e-38, 1e-20, 1e10, 1e30, 1e35])
-def test_64_light_near_the_ends_of_the_float_range_stays_finite_and_right(strength: float) -> None:
-    pixels = picture(furnace(Camera(), samples=64, strength=strength))
+@every_device
+@pytest.mark.parametrize("strength", [1e-38, 1e-20, 1e10, 1e30, 1e35, 1e38])
+def test_64_light_near_the_ends_of_the_float_range_stays_finite_and_right(strength: float, device: str) -> None:
+    pixels = picture(furnace(Camera(), samples=64, strength=strength, device=device))
     np.testing.assert_allclose(pixels[..., :3], np.float32(strength), rtol=1e-6)
 
 
-def test_64_light_beyond_the_float_range_never_enters() -> None:
-    result = render(furnace(Camera(), samples=4, strength=np.inf))
+@every_device
+def test_64_light_beyond_the_float_range_never_enters(device: str) -> None:
+    result = render(furnace(Camera(), samples=4, strength=np.inf, device=device))
     assert np.isfinite(result.passes["Combined"]).all()
 
 

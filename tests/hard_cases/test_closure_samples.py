@@ -63,7 +63,7 @@ LOBES: dict[str, tuple[str, dict[str, Any], int]] = {
         CAMERA,
     ),
 }
-ANGLES = (0.0, 45.0, 80.0, 89.5)
+ANGLES = (0.0, 45.0, 80.0, 89.5, 89.9)
 
 
 def closures(name: str, degrees: float) -> Any:

@@ -27,21 +27,20 @@ from support.closures import (
 @pytest.mark.parametrize("roughness", ROUGHNESS)
 def test_38_white_closures_return_what_they_receive(roughness: float, degrees: float) -> None:
     white = {"color": 1.0, "roughness": roughness}
-    for node in ("glossy", "glass"):
-        got = reflectance(closures(node, white, degrees))
-        # The tables have 32 (16) steps: between the last of them, at grazing angles, lobes are off.
-        step = 0.05 if degrees > 89.0 else (0.02 if node == "glass" or roughness < 0.2 else 0.004)
-        assert np.all(np.abs(got - 1.0) <= step), (node, got)
     metal = {"base_color": 1.0, "edge_tint": 1.0, "roughness": roughness}
-    assert np.all(np.abs(reflectance(closures("metallic", metal, degrees)) - 1.0) <= 0.05)
+    for node, inputs in (("glossy", white), ("metallic", metal), ("glass", white)):
+        got = reflectance(closures(node, inputs, degrees))
+        # The tables have 32 (16) steps: between the last of them, at grazing angles, lobes are off.
+        step = (0.05 if node == "glass" else 0.04) if degrees > 89.0 else (0.01 if node == "glass" else 2e-3)
+        assert np.all(np.abs(got - 1.0) <= step), (node, got)
+        assert got.max() <= (1.004 if node == "glass" else 1.002), (node, got)
 
 
 @pytest.mark.parametrize("degrees", GRAZING)
 @pytest.mark.parametrize("roughness", ROUGHNESS)
 def test_38_principled_white_dielectric_is_near_white(roughness: float, degrees: float) -> None:
     got = reflectance(closures("principled", {"base_color": 1.0, "roughness": roughness}, degrees))
-    tolerance = 0.01 if degrees <= 60.0 else 0.05  # the layering is an estimate, as in Cycles
-    assert np.all(np.abs(got - 1.0) <= tolerance), got
+    assert np.all(np.abs(got - 1.0) <= 0.01), got  # the layering is an estimate, as in Cycles
 
 
 @pytest.mark.parametrize("degrees", GRAZING)
@@ -206,3 +205,36 @@ def test_62_hostile_inputs_never_make_a_lobe_that_is_not_a_number() -> None:
                 assert not np.isnan(drawn["direction"]).any(), (name, value)
                 light, pdf = c.eval(np.concatenate([hemisphere(64, 5), -hemisphere(64, 6)]).astype(np.float32))
                 assert not np.isnan(light).any() and not np.isnan(pdf).any(), (name, value)
+
+
+EPS = 2.0**-24
+COSINES = (1.0, 1.0 - EPS, 1.0 + 2.0 * EPS, -1.0, -1.0 + EPS, -1.0 - 2.0 * EPS, 0.0, -0.0)
+LOBES: list[tuple[str, dict[str, Any]]] = [
+    *LOSSY,
+    *((node, inputs) for node, inputs, _ in RECIPROCAL),
+    ("toon", {"size": 0.4, "smooth": 0.3}),
+    ("toon", {"size": 0.4, "smooth": 0.3, "glossy": True}),
+    ("principled", {"coat_weight": 0.5, "sheen_weight": 0.5, "transmission_weight": 0.5, "metallic": 0.3}),
+    ("principled", {"anisotropic": 0.5, "thin_wall": True, "transmission_weight": 0.5, "tangent": (1.0, 0.3, 0.0)}),
+    ("hair", {"roughness_along": 0.3, "roughness_around": 0.6}),
+    ("principled_hair", {"absorption": 0.5}),
+]
+
+
+@pytest.mark.parametrize("flags", [CAMERA, CAMERA | BACKFACING])
+@pytest.mark.parametrize(("node", "inputs"), LOBES)
+def test_62_cosines_that_rounding_pushed_past_one_make_light_of_no_broken_sine(
+    node: str, inputs: dict[str, Any], flags: int
+) -> None:
+    """Of the direction seen from, and of those that light comes from; straight up, all but flat, from below."""
+    ends = np.float32([(0.0, 0.0, z) for z in COSINES] + [(1.0, 0.0, z) for z in (0.0, 1e-30, -1e-30, EPS, -EPS)])
+    for z in (1.0, 1.0 - EPS, 1.0 + 2.0 * EPS, EPS, 1e-30):
+        wo = (0.0, 0.0, z) if z > 0.5 else (1.0, 0.0, z)
+        c = core.bsdf.Closures(node, inputs, wo=wo, path_flags=flags)
+        drawn = c.sample(lattice(128))
+        for name in ("throughput", "pdf", "direction"):
+            assert np.isfinite(drawn[name]).all(), (z, name)
+        assert (drawn["throughput"] >= 0.0).all() and (drawn["pdf"] >= 0.0).all(), z
+        light, pdf = c.eval(ends)
+        assert np.isfinite(light).all() and np.isfinite(pdf).all(), z
+        assert (light >= 0.0).all() and (pdf >= 0.0).all(), z

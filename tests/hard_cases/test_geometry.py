@@ -51,6 +51,14 @@ def test_09_no_ray_of_the_camera_leaves_a_closed_room_anywhere(offset: float, mo
     assert leak(room_scene(offset, mode, 0.0, size=48, samples=8, device=device)) == 0.0
 
 
+@pytest.mark.full
+@every_device
+@pytest.mark.parametrize("mode", ["object", "vertices"])
+@pytest.mark.parametrize("offset", OFFSETS)
+def test_09_none_of_two_million_rays_leaves_a_closed_room(offset: float, mode: str, device: str) -> None:
+    assert leak(room_scene(offset, mode, 0.0, size=512, samples=4, device=device)) == 0.0
+
+
 @every_device
 @pytest.mark.parametrize("mode", ["object", "vertices"])
 @pytest.mark.parametrize("offset", OFFSETS)
@@ -84,9 +92,12 @@ def test_11_no_ray_leaves_a_ball_of_any_size(device: str) -> None:
 @pytest.mark.parametrize("elevation", [60.0, 1.0])
 @pytest.mark.parametrize("offset", [0.0, 1e4, 1e6])
 def test_12_a_plane_does_not_shade_itself(offset: float, elevation: float, device: str) -> None:
-    for distance in (1.0, 1e3, 1e6):
+    for distance in 10.0 ** np.arange(7.0):
         for tilt in (0.0, 33.0):
-            assert far_plane(distance, offset, tilt, elevation, samples=2, device=device) == 0.0, (distance, tilt)
+            assert far_plane(float(distance), offset, tilt, elevation, samples=2, device=device) == 0.0, (
+                distance,
+                tilt,
+            )
 
 
 @every_device
@@ -151,10 +162,10 @@ def test_16_nor_can_instances_that_are_traced_in_their_own_space(device: str) ->
     np.testing.assert_allclose(picture(scene), 1.0, atol=1e-4)
 
 
-def lit_ball() -> Scene:
+def lit_ball(device: str = "CPU") -> Scene:
     """A ball under a sun."""
     ball = mesh_of("Ball", accel_meshes.icosphere(3))
-    scene = scene_of([ball], [diffuse(0.8)], camera=camera_above(4.0), world=0.2, lights=[sun(50.0)])
+    scene = scene_of([ball], [diffuse(0.8)], camera=camera_above(4.0), world=0.2, lights=[sun(50.0)], device=device)
     scene.origin = HERE  # of coordinates as they are given, rounded nowhere
     return scene
 
@@ -162,15 +173,16 @@ def lit_ball() -> Scene:
 def beside(scene: Scene, mesh: Mesh, matrix: F64, emits: bool = False) -> Scene:
     """The scene with one more object."""
     return scene_of([*scene.meshes, mesh], [scene.materials[0], glow(10.0) if emits else scene.materials[0]],
-                    [at(HERE), matrix], camera=scene.camera, world=0.2, lights=scene.lights, origin=scene.origin)  # fmt: skip
+                    [at(HERE), matrix], camera=scene.camera, world=0.2, lights=scene.lights, origin=scene.origin,
+                    device=scene.settings.device)  # fmt: skip
 
 
 def broken_meshes() -> dict[str, Mesh]:
     """Rows 23 to 26 and 29: what cannot be drawn."""
     rng = np.random.default_rng(23)
     # Coordinates of few digits, so that what should lie on a line does.
-    spots = np.repeat(np.round(rng.normal(size=(50, 1, 3)), 1) * 1.25, 3, axis=1)
-    spots, along = (np.round(x * 64.0) / 64.0 for x in (spots, rng.normal(size=(50, 1, 3))))
+    spots = np.repeat(np.round(rng.normal(size=(1000, 1, 3)), 1) * 1.25, 3, axis=1)
+    spots, along = (np.round(x * 64.0) / 64.0 for x in (spots, rng.normal(size=(1000, 1, 3))))
     lines = spots + np.array([0.0, 0.5, 1.0])[:, None] * along
     vertices, triangles = accel_meshes.icosphere(1)
     broken = vertices + np.float32(50.0)
@@ -212,21 +224,35 @@ TRANSFORMS = {
 }
 
 
+@every_device
 @pytest.mark.parametrize("emits", [False, True])
 @pytest.mark.parametrize("name", BROKEN)
-def test_23_to_26_29_and_30_a_broken_mesh_changes_no_pixel_and_takes_no_light(name: str, emits: bool) -> None:
-    alone = picture(lit_ball())
-    among = picture(beside(lit_ball(), BROKEN[name], at(HERE), emits))
+def test_23_to_26_29_and_30_a_broken_mesh_changes_no_pixel_and_takes_no_light(
+    name: str, emits: bool, device: str
+) -> None:
+    alone = picture(lit_ball(device))
+    among = picture(beside(lit_ball(device), BROKEN[name], at(HERE), emits))
     np.testing.assert_array_equal(among, alone)
 
 
+@every_device
+@pytest.mark.parametrize("emits", [False, True])
+@pytest.mark.parametrize("size", [1e-30, 1e-40])
+def test_26_and_30_a_tiny_ball_before_the_camera_changes_no_pixel(size: float, emits: bool, device: str) -> None:
+    points, triangles = accel_meshes.icosphere(2)
+    tiny = mesh_of("Tiny", ((points.astype(np.float64) * size).astype(np.float32), triangles))
+    among = picture(beside(lit_ball(device), tiny, at((0.3, 0.2, 3.0)), emits))
+    np.testing.assert_array_equal(among, picture(lit_ball(device)))
+
+
+@every_device
 @pytest.mark.parametrize("emits", [False, True])
 @pytest.mark.parametrize("name", TRANSFORMS)
-def test_27_and_30_a_broken_transform_changes_no_pixel_and_takes_no_light(name: str, emits: bool) -> None:
+def test_27_and_30_a_broken_transform_changes_no_pixel_and_takes_no_light(name: str, emits: bool, device: str) -> None:
     with np.errstate(invalid="ignore"):
         other = mesh_of("Other", accel_meshes.icosphere(2))
-        among = picture(beside(lit_ball(), other, TRANSFORMS[name], emits))
-    np.testing.assert_allclose(among, picture(lit_ball()), rtol=1e-6)
+        among = picture(beside(lit_ball(device), other, TRANSFORMS[name], emits))
+    np.testing.assert_allclose(among, picture(lit_ball(device)), rtol=1e-6)
 
 
 @pytest.mark.parametrize("size", [1e30, 1e37])
@@ -239,9 +265,12 @@ def test_30_an_endless_emitter_far_away_takes_no_light_from_the_rest(size: float
     assert np.isfinite(lit) and lit >= 0.99 * unlit, (alone, unlit, lit)
 
 
-def test_29_a_single_triangle_renders() -> None:
+@every_device
+def test_29_a_single_triangle_renders(device: str) -> None:
     one = mesh_of("One", accel_meshes.separate(np.array([[(-9, -9, 0), (9, -9, 0), (0, 9, 0)]])))
-    np.testing.assert_allclose(picture(scene_of([one], [diffuse(1.0)], camera=camera_above(0.5))), 1.0, atol=1e-5)
+    np.testing.assert_allclose(
+        picture(scene_of([one], [diffuse(1.0)], camera=camera_above(0.5), device=device)), 1.0, atol=1e-5
+    )
 
 
 @every_device
@@ -255,25 +284,33 @@ def test_28_flattened_instances_keep_the_light_between_them(thickness: float, de
     np.testing.assert_allclose(picture(scene), 1.0, atol=1e-4)
 
 
-@pytest.mark.parametrize("copies", [1000, 100_000])
-def test_31_and_32_triangles_that_coincide_or_share_a_plane_look_like_one_layer(copies: int) -> None:
+@every_device
+@pytest.mark.parametrize("copies", [1000, 100_000, pytest.param(1_000_000, marks=pytest.mark.full)])
+def test_31_and_32_triangles_that_coincide_or_share_a_plane_look_like_one_layer(copies: int, device: str) -> None:
     camera = camera_above(0.5)
     one = accel_meshes.separate(np.array([[(-3, -3, 0), (3, -3, 0), (0, 3, 0)]]))
     same = (np.tile(one[0], (copies, 1)), np.arange(3 * copies, dtype=np.uint32).reshape(-1, 3))
     rng = np.random.default_rng(32)
     spots = np.concatenate([rng.uniform(-1, 1, (copies, 1, 2)) + 0.3 * rng.normal(size=(copies, 3, 2)),
                             np.zeros((copies, 3, 1))], axis=2)  # fmt: skip
-    plane = accel_meshes.separate(spots[: min(copies, 20_000)])
+    plane = accel_meshes.separate(spots)
     layer, twins, flat = (
-        picture(scene_of([mesh_of("Layer", mesh)], [diffuse(0.5)], camera=camera, world=0.3, lights=[sun(60.0)]))
+        picture(
+            scene_of(
+                [mesh_of("Layer", mesh)], [diffuse(0.5)], camera=camera, world=0.3, lights=[sun(60.0)], device=device
+            )
+        )
         for mesh in (one, same, plane)
     )
     np.testing.assert_array_equal(twins, layer)
     assert flat.mean() == pytest.approx(layer.mean(), rel=0.02)
 
 
+@every_device
 @pytest.mark.parametrize("scale", [(-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0), (3.0, 0.3, 1.0)])
-def test_37_a_mirrored_or_sheared_instance_looks_like_its_baked_mesh(scale: tuple[float, float, float]) -> None:
+def test_37_a_mirrored_or_sheared_instance_looks_like_its_baked_mesh(
+    scale: tuple[float, float, float], device: str
+) -> None:
     points, triangles = accel_meshes.icosphere(2)
     turn = turned(5)[:, :3] if scale[0] > 1.0 else np.eye(3)
     linear = turn @ np.diag(scale)
@@ -283,7 +320,7 @@ def test_37_a_mirrored_or_sheared_instance_looks_like_its_baked_mesh(scale: tupl
     pictures: list[F32] = []
     for mesh, matrix in ((baked, at(HERE)), ((points, triangles), np.column_stack([linear, np.zeros(3)]))):
         scene = scene_of([mesh_of("Ball", mesh)], [glass()], [matrix], camera=camera, world=0.2, lights=[sun(50.0)],
-                         samples=16)  # fmt: skip
+                         samples=16, device=device)  # fmt: skip
         scene.film.passes = ["Combined", "Normal"]
         passes = render(scene).passes
         assert np.isfinite(passes["Combined"]).all()
@@ -293,17 +330,19 @@ def test_37_a_mirrored_or_sheared_instance_looks_like_its_baked_mesh(scale: tupl
     np.testing.assert_allclose(pictures[3], pictures[1], atol=2e-2)
 
 
-def test_36_an_instance_of_many_nested_transforms_is_the_one_transform_they_make() -> None:
-    """What 32 parents make, each mirrored and stretched, arrives as one matrix in double."""
+@every_device
+@pytest.mark.parametrize("depth", [8, 32])
+def test_36_an_instance_of_many_nested_transforms_is_the_one_transform_they_make(depth: int, device: str) -> None:
+    """What so many parents make, each mirrored and stretched, arrives as one matrix in double."""
     step = np.eye(4)
     step[:3, :3] = np.diag([-1.01, 1.0, 0.99])
     step[:3, 3] = 0.01, -0.02, 0.0
-    matrix = np.linalg.matrix_power(step, 32)[:3]
+    matrix = np.linalg.matrix_power(step, depth)[:3]
     points, triangles = accel_meshes.icosphere(2)
     baked = (points @ matrix[:, :3].T + matrix[:, 3]).astype(np.float32)
     ours, flat = (
         picture(scene_of([mesh_of("Ball", mesh)], [diffuse(0.8)], [where], camera=camera_above(5.0), world=0.2,
-                         lights=[sun(50.0)]))
+                         lights=[sun(50.0)], device=device))
         for mesh, where in (((points, triangles), matrix), ((baked, triangles), at(HERE)))
     )  # fmt: skip
     assert (np.abs(ours - flat).max(axis=2) > 1e-3).mean() <= 0.02
@@ -322,18 +361,20 @@ def bytes_of(count: int) -> tuple[float, float]:
 
 
 @pytest.mark.long
-def test_35_instances_cost_memory_and_time_in_proportion() -> None:
-    taken = {count: bytes_of(count) for count in (30_000, 100_000)}  # the first more than are copied to the world
+@pytest.mark.parametrize("counts", [(30_000, 100_000), pytest.param((1000, 1_000_000), marks=pytest.mark.full)])
+def test_35_instances_cost_memory_and_time_in_proportion(counts: Sequence[int]) -> None:
+    taken = {count: bytes_of(count) for count in counts}  # few are copied to the world
     for count, (size, seconds) in taken.items():
         print(f"{count} instances: {size:.0f} bytes and {seconds * 1e6:.1f} us each")
         assert size <= 2048.0 and seconds <= 35e-6
 
 
-def test_63_empty_scenes_show_the_world() -> None:
-    empty = scene_of([], [], camera=camera_above(2.0), world=0.25)
+@every_device
+def test_63_empty_scenes_show_the_world(device: str) -> None:
+    empty = scene_of([], [], camera=camera_above(2.0), world=0.25, device=device)
     np.testing.assert_array_equal(picture(empty), np.float32(0.25))
-    np.testing.assert_array_equal(picture(scene_of([], [], camera=camera_above(2.0), world=0.0)), 0.0)
-    hidden = lit_ball()
+    np.testing.assert_array_equal(picture(scene_of([], [], camera=camera_above(2.0), world=0.0, device=device)), 0.0)
+    hidden = lit_ball(device)
     hidden.objects[0].visibility = 0
     hidden.lights = []
     np.testing.assert_allclose(picture(hidden), 0.2, rtol=1e-6)

@@ -23,26 +23,33 @@ OTHERS = 20_000
 
 @every_device
 @every_kind
+@pytest.mark.parametrize("each", [0, pytest.param(1_000_000, marks=pytest.mark.full)])
 @pytest.mark.parametrize("name", closed_meshes.MESHES)
-def test_rows_1_to_8_no_ray_leaves_a_closed_mesh(name: str, kind: Kind, device: Device) -> None:
+def test_rows_1_to_8_no_ray_leaves_a_closed_mesh(name: str, each: int, kind: Kind, device: Device) -> None:
+    """each: rays of every sort; 0: some tenths of a second of them."""
+    some = COUNT.get(kind, OTHERS) // len(closed_meshes.RAYS)
+    count = each if each and kind != "BRUTE_FORCE" else some
     accel = Accel(*closed_meshes.MESHES[name], kind=kind, device=device)
     for rays in closed_meshes.RAYS:
-        out, traced = closed_meshes.leaks(accel, name, rays, COUNT.get(kind, OTHERS) // len(closed_meshes.RAYS))
+        out, traced = closed_meshes.leaks(accel, name, rays, count)
         assert out == 0, f"{rays}: {out} of {traced}"
 
 
 @every_device
 @every_kind
-def test_row_17_rays_off_a_face_do_not_hit_it_and_rays_into_the_cube_leave_it(kind: Kind, device: Device) -> None:
-    """From vertices, edges and faces of the cube, moved off as the integrator moves them."""
+@pytest.mark.parametrize("count", [60_000, pytest.param(3_000_000, marks=pytest.mark.full)])
+def test_row_17_rays_off_a_face_do_not_hit_it_and_rays_into_the_cube_leave_it(
+    kind: Kind, device: Device, count: int
+) -> None:
+    """From vertices, edges and faces of the cube, of which half are their middles, moved off as the integrator does."""
     mesh = cube(1, 1)
     rng = np.random.default_rng(17)
-    count = 3000
     own = rng.integers(len(mesh[1]), size=count)
     corners = mesh[0][mesh[1][own]]
     weights = rng.dirichlet(np.ones(3), count)
     weights[::3] = [1, 0, 0]
     weights[1::3] = np.stack([weights[1::3, 0], 1 - weights[1::3, 0], 0 * weights[1::3, 0]], 1)
+    weights[1::6], weights[2::6] = [0.5, 0.5, 0], [1 / 3, 1 / 3, 1 / 3]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal *= np.sign((normal * corners.mean(1)).sum(1, keepdims=True))
     direction = np.float32(rng.normal(size=(count, 3)))
@@ -132,6 +139,8 @@ def test_row_22_rays_that_are_none_miss(kind: Kind, device: Device) -> None:
     for bad in (still, backwards):
         t, prim, _, _ = accel.closest(bad)
         assert (prim == -1).all() and (t == np.inf).all()
+        spent = [sum(accel.count(rays)[part] for part in ("nodes", "primitives")) for rays in (bad, good)]
+        assert spent[0] <= 2.5 * spent[1]
 
 
 @every_device
@@ -139,8 +148,8 @@ def test_row_22_rays_that_are_none_miss(kind: Kind, device: Device) -> None:
 def test_rows_23_to_26_bad_triangles_change_no_hit_on_good_ones(kind: Kind, device: Device) -> None:
     ball = icosphere(3)
     rng = np.random.default_rng(23)
-    point = np.repeat(rng.normal(size=(50, 1, 3)), 3, axis=1)
-    line = point + np.array([0.0, 0.5, 1.0])[:, None] * rng.normal(size=(50, 1, 3))
+    point = np.repeat(rng.normal(size=(1000, 1, 3)), 3, axis=1)
+    line = point + np.array([0.0, 0.5, 1.0])[:, None] * rng.normal(size=(1000, 1, 3))
     odd = np.array([[(np.nan, 0, 0), (1, 0, 0), (0, 1, 0)], [(np.inf, 0, 0), (1, 0, 0), (0, 1, 0)],
                     [(3e38, 0, 0), (0, 3e38, 0), (0, 0, 3e38)], [(1e-40, 0, 0), (0, 1e-40, 0), (0, 0, 1e-40)]])  # fmt: skip
     extra = np.concatenate([point, line, odd]).astype(np.float32).reshape(-1, 3)
@@ -202,8 +211,8 @@ def test_row_33_ever_smaller_triangles_make_no_endless_tree(
 @every_device
 @pytest.mark.parametrize("kind", ["BVH2", "BVH2_STACKLESS", "CWBVH", "KD_TREE", "HIERARCHICAL_GRID"])
 def test_row_34_a_stadium_around_a_teapot_costs_its_rays_little(kind: Kind, device: Device) -> None:
-    ball = closed_meshes.moved(icosphere(5), 0.01)
-    stadium = soup(5000, 0.01, seed=34)
+    ball = closed_meshes.moved(icosphere(6), 0.01)
+    stadium = soup(20_000, 0.01, seed=34)
     around = (np.concatenate([ball[0], stadium[0] * np.float32(500)]),
               np.concatenate([ball[1], stadium[1] + np.uint32(len(ball[0]))]))  # fmt: skip
     rng = np.random.default_rng(34)
