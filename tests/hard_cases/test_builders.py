@@ -138,7 +138,7 @@ def test_32_triangles_in_one_plane_cost_no_more_than_as_many_random_ones(
     count: int, kind: Kind, device: Device
 ) -> None:
     count //= 1000 if kind == "BRUTE_FORCE" else 1
-    spread = soup(count, 0.02)
+    spread = soup(count, 6.3 / np.sqrt(count))  # as many layers at any count, some thirty
     flat = (spread[0] * np.float32([1, 1, 0]), spread[1])
     rng = np.random.default_rng(32)
     eye = np.column_stack([rng.uniform(-1, 1, (200, 2)), np.full(200, 5.0)])

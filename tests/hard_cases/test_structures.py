@@ -55,7 +55,8 @@ def test_20_a_million_random_rays_hit_alike_in_all_structures(name: str, device:
         for accel in structures:
             assert bits_differ(accel.closest(rays), expected) == 0, accel.kind
             assert np.array_equal(accel.any(rays), expected[1] >= 0), accel.kind
-    assert hit > 1000 or name in FLAT
+    print(f"{hit} of {16 << 16} rays hit")
+    assert hit > 1000 or name in (*FLAT, "needles")
 
 
 def kept_and_dropped(accel: Accel) -> tuple[int, int]:
