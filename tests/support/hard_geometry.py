@@ -113,11 +113,16 @@ def edge_energy(
     return abs(float(pixels.mean(dtype=np.float64)) - 1.0), float(off.max())
 
 
-def stack(copies: int, **settings: Any) -> F32:
+def stack_of_objects(copies: int, **settings: Any) -> Scene:
     """A lit quad, as one of `copies` that coincide."""
     meshes = [quad(4.0, name=f"Quad {k}") for k in range(copies)]
     camera = Camera(kind="ORTHO", matrix=looking((0.3, 0.2, 5.0), (0.3, 0.2, 0.0)), ortho_scale=2.0)
-    return picture(scene_of(meshes, [diffuse(0.5)], camera=camera, world=0.3, lights=[sun(60.0)], **settings))
+    return scene_of(meshes, [diffuse(0.5)], camera=camera, world=0.3, lights=[sun(60.0)], **settings)
+
+
+def stack(copies: int, **settings: Any) -> F32:
+    """Their picture."""
+    return picture(stack_of_objects(copies, **settings))
 
 
 def stack_in_one_mesh(copies: int, **settings: Any) -> Scene:

@@ -22,18 +22,23 @@ class CopySearch {
     // Whether the primitive is a copy of one seen before; else it is remembered. same(a, b) compares all of them.
     template <class Same>
     bool seen(u32 hash, u32 ref, Same&& same) {
-        Slot& slot = slots_[hash % SLOTS];
-        if (slot.ref != NONE && slot.hash == hash && same(slot.ref, ref)) return true;
-        slot = {hash, ref};
+        auto& [last, before] = slots_[hash % SLOTS];
+        for (const Slot& slot : {last, before})
+            if (slot.ref != NONE && slot.hash == hash && same(slot.ref, ref)) return true;
+        before = last;
+        last = {hash, ref};
         return false;
     }
 
  private:
-    static constexpr u32 SLOTS = 1024;
+    static constexpr u32 SLOTS = 512;
     struct Slot {
         u32 hash = 0, ref = NONE;
     };
-    Slot slots_[SLOTS];
+    struct Pair {
+        Slot last, before;  // both halves of a quad along the axes have one box, by which they are found
+    };
+    Pair slots_[SLOTS];
 };
 
 // Among all; items ascend by ref. hash(item), same(item, item); left_out(item) is told each copy. Returns how many stay.
