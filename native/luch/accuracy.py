@@ -71,16 +71,23 @@ class Estimate:
 
 def overstated(share: float, rate: float) -> float:
     """By how much the square of a deviation exceeds the squared error, where the first part of one sequence holds that
-    share of the samples and the relMSE of n samples falls as n^-rate, 1 <= rate < 2.
+    share of the samples, a power of two of them, and the relMSE of n samples falls as n^-rate, 1 <= rate < 2.
 
-    Sums of n samples then vary as n^(2 - rate), wherever in the sequence they begin, as increments of a fractional
-    Brownian motion do (Mandelbrot and Van Ness 1968); the covariance of two parts follows. share 0: of parts that are
+    Nets are nested: the first 2^k samples and the next 2^k are two halves of a net, whose errors a and b have
+    E[ab] = 2 E(2^(k+1)) - E(2^k), with E(n) what n samples err by; so has any sample of the next half with the first,
+    as scrambling prefers none. Those of the half after have 2 E(2^(k+2)) - E(2^(k+1)). share 0: of parts that are
     independent, 1.
     """
     if not 0.0 < share < 1.0:
         return 1.0
-    a, b, power = share, 1.0 - share, 2.0 - rate
-    return float(a * b * (a ** (power - 2.0) + b ** (power - 2.0)) + a**power + b**power - 1.0)
+    rest, power = 1.0 - share, 2.0**-rate
+    more = rest / share  # samples of the second part over those of the first
+    near, far = 2.0 * power - 1.0, power * (2.0 * power - 1.0)
+    both = near if more <= 1.0 else (near + (more - 1.0) * far) / more
+    own = more**-rate
+    return float(
+        share * rest * (1.0 + own - 2.0 * both) / (share * share + rest * rest * own + 2.0 * share * rest * both)
+    )
 
 
 def _sums(image: F64, radius: int, axis: int) -> F64:

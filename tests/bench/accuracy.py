@@ -2,7 +2,9 @@
 
 For each scene, small, against a picture converged by Luch itself (its noise is taken out of every error):
 
-  A2  (claimed error / true error)^2 from 32 samples on: median, part within 0.8..1.25; part whose 95 % interval holds
+  A2  claimed error over true error from 32 samples on: the square's median; part of the looks of which the error lies
+      within 0.8..1.25, and of which its square does; part whose 95 % interval holds. Over all scenes also the part of
+      the cases (scene, sampler, samples) of which the squares' means over the seeds do
   A3  at 64 samples: part of pixels and channels whose 95 % interval holds; its width over the true error's, median; part
       of the pixels that Reliability flags; of those that are off by twice their interval, how many it flags
   A4  renders that end at an error asked for: true over asked, median, part within 0.7..1.1; samples taken
@@ -34,7 +36,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "bench"), str(ROOT), str(ROOT / "native"), str(ROOT / "tests")]
 
 import numpy as np  # noqa: E402
-from accuracy_page import FILE, Kept, Row, report, table, write_page_from  # noqa: E402
+from accuracy_page import FILE, Kept, Row, report, write_page_from  # noqa: E402
 from luch import accuracy, image, pixel_error, samplers  # noqa: E402
 from luch._native import core  # noqa: E402
 from luch.cuda.several import renderer_for  # noqa: E402
@@ -46,7 +48,7 @@ from luch.stopping import CUSTOM, looks_after  # noqa: E402
 from support.races import Truth, in_turns  # noqa: E402
 
 OUT = ROOT / "out" / "bench"
-MOST = 1024  # samples of A6
+MOST = 1024  # samples of A6; with --only-looks as many as A2 asks for
 SEEN = 32, 256  # samples of the looks that A2 asks for
 AHEAD = (64, 4), (256, 4), (64, 16)  # forecasts that A6 asks for: samples, and how many times as many
 PIXELS_AT = 64  # samples of A3
@@ -145,15 +147,15 @@ class Pixels:
         return float(np.median((np.mean(self.told, axis=0) / np.maximum(true, 1e-12))[true > 0.0]))
 
 
-def look_at(scene: Scene, truth: Truth, seed: int, row: Row, pixels: Pixels) -> list[tuple[int, float]]:
+def look_at(scene: Scene, truth: Truth, seed: int, row: Row, pixels: Pixels, most: int) -> list[tuple[int, float]]:
     """A2 and A6 of one render; its true errors by samples."""
-    settled = with_settings(scene, samples=MOST, seed=seed, estimate_error=True)
+    settled = with_settings(scene, samples=most, seed=seed, estimate_error=True)
     renderer = renderer_for(settled) if scene.settings.device == "CUDA" else core.render.Renderer(settled)
     renderer.prepare()
     curve, done, spent, seen = Curve(scene.settings.sampler), 0, 0.0, []
     kept: dict[int, tuple[Curve, float]] = {}
-    while done < MOST:
-        following = min(looks_after(done), MOST)
+    while done < most:
+        following = min(looks_after(done), most)
         began = time.perf_counter()
         renderer.render(done, following - done)
         spent, done = spent + time.perf_counter() - began, following
@@ -167,7 +169,7 @@ def look_at(scene: Scene, truth: Truth, seed: int, row: Row, pixels: Pixels) -> 
         if done == PIXELS_AT:
             pixels.add(mean, deviation, (share, curve.rate()[0]), error)
         if SEEN[0] <= done <= SEEN[1]:
-            row.a2.append((told.error / error) ** 2)
+            row.a2.append((done, told.error, error))
             row.a2_covered.append(told.error_low <= error <= told.error_high)
         for first, times in AHEAD:
             if done == first:
@@ -224,8 +226,11 @@ def race(scene: Scene, name: str, sampler: str, options: argparse.Namespace) -> 
     truth = converged(scene, name, options.reference, options.reference_device or options.device)
     row = Row(name, sampler, scene.film.width, scene.film.height)
     pixels = Pixels(truth, row)
-    seen = [look_at(scene, truth, seed, row, pixels) for seed in range(options.seeds)]
+    most = SEEN[1] if options.only_looks else MOST
+    seen = [look_at(scene, truth, seed, row, pixels, most) for seed in range(options.seeds)]
     row.a3_width = pixels.width
+    if options.only_looks:
+        return row
     for samples in (48, 160):
         asked = float(np.median([np.interp(np.log(samples), *np.log(one).T) for one in seen]))
         for seed in range(options.seeds):
@@ -288,6 +293,9 @@ def main() -> int:
     parser.add_argument("--pairs", type=int, default=5, help="pairs of renders that A8 compares")
     parser.add_argument("--reference", type=int, default=8192, help="samples of the converged picture")
     parser.add_argument("--cycles", action="store_true", help="Cycles' noise threshold beside, on the same scenes")
+    parser.add_argument(
+        "--only-looks", action="store_true", help="A2, A3 and A6 of four times as many samples, no more"
+    )
     parser.add_argument("--only-cycles", action="store_true", help="no rows of Luch's own")
     parser.add_argument(
         "--capture", type=Path, metavar="FOLDER", help="write the scenes, small, as .luch files, and end"
@@ -354,7 +362,7 @@ def measure(files: list[Path], options: argparse.Namespace, kept: Kept) -> list[
                 failed.append(f"{name}, {sampler}")
                 print(f"{failed[-1]}: {error}", flush=True)
                 continue
-            print(table(kept.rows[-1:]), flush=True)
+            print(report(kept.rows[-1:], kept.what), flush=True)
             if options.write:
                 kept.write_page()
     return failed

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "out" / "bench" / "accuracy.json"
 PAGE = ROOT / "docs" / "accuracy.md"
 BEGIN, END = "<!-- table: build.py bench accuracy -->", "<!-- end of table -->"
-IN_BAND = 0.8, 1.25  # A2, of squared errors
+IN_BAND = 0.8, 1.25  # A2
 MET = 0.7, 1.1  # A4, of errors
 NEAR = np.log(0.8), np.log(1.2)  # A6
 SAME_LIGHT = 1e-3  # A5, of the mean brightness
@@ -31,7 +31,7 @@ class Row:
     sampler: str
     width: int
     height: int
-    a2: list[float] = field(default_factory=list)
+    a2: list[tuple[int, float, float]] = field(default_factory=list)  # samples, claimed error, true error
     a2_covered: list[bool] = field(default_factory=list)
     a3: list[float] = field(default_factory=list)
     a3_width: float = 0.0
@@ -53,16 +53,22 @@ class Row:
     def key(self) -> tuple[str, str]:
         return self.scene, self.sampler
 
+    def cells_of_looks(self) -> list[str]:
+        """For the table of --only-looks."""
+        looks = f"{np.median(_ratios(self.a2) ** 2):.2f}; {_bands(self.a2)}; {np.mean(self.a2_covered):.0%}"
+        return [self.scene, self.sampler, looks, _foretold(self.a6)]
+
     def cells(self) -> list[str]:
         """For the table."""
+        scene, sampler, looks, foretold = self.cells_of_looks()
         return [
-            self.scene,
-            self.sampler,
-            f"{np.median(self.a2):.2f}; {_within(self.a2, *IN_BAND)}; {np.mean(self.a2_covered):.0%}",
+            scene,
+            sampler,
+            looks,
             f"{np.mean(self.a3):.1%}; {self.a3_width:.2f}; {np.mean(self.a3_flagged):.0%}; {_of(self.a3_gross)}",
             f"{np.median(self.a4):.2f}; {_within(self.a4, *MET)}; {np.median(self.a4_samples):.0f}",
             _per_cent(self.a5),
-            _foretold(self.a6),
+            foretold,
             _foretold(self.a6_far),
             f"{1000.0 * max(self.a7):.0f} ms",
             f"{np.median(self.a8):.3f}",
@@ -74,6 +80,24 @@ class Row:
 def _within(values: Any, low: float, high: float) -> str:
     values = np.asarray(values)
     return f"{np.mean((values >= low) & (values <= high)):.0%}"
+
+
+def _ratios(looks: list[tuple[int, float, float]]) -> Any:
+    return np.array([told / true for _, told, true in looks])
+
+
+def _bands(looks: list[tuple[int, float, float]]) -> str:
+    """Of errors, and of their squares."""
+    return f"{_within(_ratios(looks), *IN_BAND)}, {_within(_ratios(looks) ** 2, *IN_BAND)}"
+
+
+def _cases(rows: list[Row]) -> str:
+    """Of the mean squares over seeds, at each number of samples."""
+    found: dict[tuple[str, str, int], list[tuple[float, float]]] = {}
+    for row in rows:
+        for samples, told, true in row.a2:
+            found.setdefault((*row.key, samples), []).append((told * told, true * true))
+    return _within([np.divide(*np.mean(pairs, axis=0)) for pairs in found.values()], *IN_BAND)
 
 
 def _of(counted: Iterable[tuple[int, int]]) -> str:
@@ -96,11 +120,12 @@ def _per_cent(values: Any) -> str:
     return f"{100.0 * mean:+.2f} +- {100.0 * doubt:.2f}"
 
 
-HEADINGS = ["scene", "sampler", "A2 ratio; in band; covered", "A3 covered; width; flagged; gross misses flagged", "A4 true/asked; in band; samples", "A5 brightness %",
+HEADINGS = ["scene", "sampler", "A2 squared ratio; in band: error, squared; covered", "A3 covered; width; flagged; gross misses flagged", "A4 true/asked; in band; samples", "A5 brightness %",
             "A6 x4: log ratio; in 20 %; covered", "A6 x16", "A7 over", "A8 cost", "adaptive: true/asked; samples; brightness %"]  # fmt: skip
+LOOKS_HEADINGS = ["scene", "sampler", HEADINGS[2], HEADINGS[6]]
 CYCLES_HEADINGS = ["scene", "noise threshold", "Cycles: true error %; s; brightness %",
                    "Luch asked for that: true error %; s; brightness %", "energy, Cycles over Luch"]  # fmt: skip
-SUMMARY_HEADINGS = ["all scenes", "rows", "A2 in band (goal 90 %); covered (95 %)", "A3 covered; width (2.6); gross misses flagged (80 %)",
+SUMMARY_HEADINGS = ["all scenes", "rows", "A2 in band (goal 90 %): error, squared, cases; covered (95 %)", "A3 covered; width (2.6); gross misses flagged (80 %)",
                     "A4 met (90 %)", "A5 brightness %; rows within 0.1 %; within 2 standard errors", "A6 x4: log ratio (0.10); in 20 % (90 %); covered (80 %)", "A6 x16: in 20 % (80 %)", "A8 cost (1.03)"]  # fmt: skip
 
 
@@ -110,8 +135,22 @@ def _lines(headings: list[str], rows: Iterable[list[str]]) -> str:
 
 
 def table(rows: list[Row]) -> str:
-    """Every row."""
-    return _lines(HEADINGS, (row.cells() for row in rows if row.a2))
+    """Every row that was measured whole."""
+    return _lines(HEADINGS, (row.cells() for row in rows))
+
+
+def looks_table(rows: list[Row]) -> str:
+    """Rows of --only-looks, and what they come to."""
+    told = [row.cells_of_looks() for row in rows]
+    for name, own in _by_sampler(rows):
+        looks = [look for row in own for look in row.a2]
+        held = np.mean([held for row in own for held in row.a2_covered])
+        squared = np.median(_ratios(looks) ** 2)
+        told.append([
+            "all", name, f"{squared:.2f}; {_bands(looks)}; {held:.0%} (cases: {_cases(own)})",
+            _foretold([pair for row in own for pair in row.a6]),
+        ])  # fmt: skip
+    return _lines(LOOKS_HEADINGS, told)
 
 
 def cycles_table(rows: list[Row]) -> str:
@@ -129,11 +168,13 @@ def cycles_table(rows: list[Row]) -> str:
 
 def summary(rows: list[Row]) -> str:
     """The goals' rows A2 to A6 over all scenes, one line a sampler and one for all."""
+    return _lines(SUMMARY_HEADINGS, (_summed(name, own) for name, own in _by_sampler(rows)))
+
+
+def _by_sampler(rows: list[Row]) -> list[tuple[str, list[Row]]]:
     samplers = list(dict.fromkeys(row.sampler for row in rows))
     groups = [(sampler, [row for row in rows if row.sampler == sampler]) for sampler in samplers]
-    if len(samplers) > 1:
-        groups.append(("all", rows))
-    return _lines(SUMMARY_HEADINGS, (_summed(name, own) for name, own in groups))
+    return [*groups, ("all", rows)] if len(samplers) > 1 else groups
 
 
 def _summed(name: str, rows: list[Row]) -> list[str]:
@@ -146,7 +187,8 @@ def _summed(name: str, rows: list[Row]) -> list[str]:
     return [
         name,
         str(len(rows)),
-        f"{_within(together(lambda row: row.a2), *IN_BAND)}; {np.mean(together(lambda row: row.a2_covered)):.0%}",
+        f"{_bands([look for row in rows for look in row.a2])}, {_cases(rows)}; "
+        f"{np.mean(together(lambda row: row.a2_covered)):.0%}",
         f"{np.mean(together(lambda row: row.a3)):.1%}; {np.median([row.a3_width for row in rows]):.2f}; "
         f"{_of([pair for row in rows for pair in row.a3_gross])}",
         _within(together(lambda row: row.a4), *MET),
@@ -159,8 +201,10 @@ def _summed(name: str, rows: list[Row]) -> list[str]:
 
 def report(rows: list[Row], what: dict[str, Any]) -> str:
     """Everything, for the page."""
-    own = [row for row in rows if row.a2]
+    own, looks = [row for row in rows if row.a4], [row for row in rows if row.a2 and not row.a4]
     tables = [table(own), summary(own)] if own else []
+    if looks:
+        tables.append(looks_table(looks))
     return "\n\n".join(part for part in (_head(what), *tables, cycles_table(rows)) if part)
 
 
