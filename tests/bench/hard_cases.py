@@ -174,6 +174,7 @@ def stress_figures(o: Options) -> Iterator[Figure]:
     rays = accel_meshes.rows(eye, rng.uniform(-0.5, 0.5, (20_000, 3)) - eye)
     ratios = {}
     for kind in TRACED:
+        Accel(*accel_meshes.soup(10), kind=kind, device=o.device).closest(rays[:1])  # a device loads its kernels once
         seconds = []
         for mesh in (same, accel_meshes.soup(count, 0.02)):
             start = time.perf_counter()
