@@ -23,7 +23,7 @@ from luch.report import tally
 from luch.scene import Scene
 from support import synthetic
 from support.everything import everything
-from support.races import Truth, in_turns
+from support.races import Truth, in_turns, products_ratio
 
 SIZE = synthetic.SIZE
 
@@ -89,6 +89,20 @@ def test_a_machine_that_slows_down_does_not_decide_a_race() -> None:
     assert pace[0] > 1.8
     slower = in_turns(work(1.1), other, 11, lambda: now[0])
     assert np.median(slower) == pytest.approx(1.1, abs=0.04)
+
+
+def test_products_of_error_and_time_are_compared_turn_by_turn_and_their_interval_holds() -> None:
+    rng, turns, held, off = np.random.default_rng(3), 8, 0, []
+    for _ in range(200):
+        machine = np.exp(rng.normal(0.0, 0.3, turns))  # what else it does, for both engines alike
+        theirs = rng.normal(0.03, 0.003, turns), 2.0 * machine * rng.normal(1.0, 0.02, turns)
+        ours = rng.normal(0.02, 0.002, turns), 1.0 * machine * rng.normal(1.0, 0.02, turns)
+        ratio, low, high = products_ratio(theirs, ours)  # type: ignore[arg-type]
+        held += low <= 3.0 <= high
+        off.append(ratio / 3.0 - 1.0)
+    assert np.std(off) < 0.06, "the machine's moods, 30 %, are gone"
+    assert abs(np.mean(off)) < 0.015
+    assert held >= 170  # 95 % of endless turns; eight make the interval a little narrow
 
 
 def test_an_engine_whose_pixels_lie_elsewhere_is_judged_by_its_own_reference() -> None:

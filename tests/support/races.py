@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from luch.accuracy import DARK
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
+Turns = tuple[Sequence[float], Sequence[float]]  # relMSE and seconds, a value for each turn
+DRAWS = 4000  # of a bootstrap
 
 
 class Truth:
@@ -57,3 +59,20 @@ def in_turns(
             spent[work] = clock() - began
         ratios.append(spent[one] / spent[other])
     return ratios
+
+
+def products_ratio(theirs: Turns, ours: Turns) -> tuple[float, float, float]:
+    """relMSE times seconds, one over the other, with its 95 % interval by drawing turns anew.
+
+    Seconds are compared turn by turn, since what else the machine did weighed on both; errors of one seed have nothing
+    in common between engines, so their means are. An interval of few turns is too narrow: draws know no other errors.
+    """
+    seconds = np.array(theirs[1]) / np.array(ours[1])
+    rng, turns = np.random.default_rng(1), len(seconds)
+
+    def drawn(values: Sequence[float] | F64) -> F64:
+        return np.asarray(values, np.float64)[rng.integers(0, turns, (DRAWS, turns))]
+
+    errors = drawn(theirs[0]).mean(axis=1) / drawn(ours[0]).mean(axis=1)
+    low, high = np.percentile(errors * np.median(drawn(seconds), axis=1), [2.5, 97.5])
+    return float(np.mean(theirs[0]) / np.mean(ours[0]) * np.median(seconds)), float(low), float(high)
