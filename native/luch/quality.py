@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 TAKES_NOTHING = "REFERENCE"  # the step that allows no bias at all
 PILOT_SHARE = 0.1  # of the seconds that the render is foretold to take
 LEAST_PILOT, MOST_PILOT = 1.0, 30.0  # seconds; less tells nothing, more is not needed
+PILOT_GROWS = 4.0  # times as long as the look before: a short one may foretell five times too much
 PATIENCE = 4.0  # the first look at a scene may take so many times LEAST_PILOT where a busy machine needs it
 SOONER = 0.85  # of the time as the scene is set: a choice that gains less is not worth other settings
 BIAS_SHARE = 0.7  # of the error asked for, that bias may make up
@@ -119,21 +120,23 @@ def pilot(scene: Scene, step: str, watch: Callable[[Told], bool] | None = None) 
         return plain
     if quick.cancelled:
         raise Cancelled
-    found = choose(first, step)
-    seconds = PILOT_SHARE * found.seconds
-    if seconds < LEAST_PILOT or step == TAKES_NOTHING:
-        return found
-    # An endless forecast is no reason for an endless pilot.
-    session = Session(scene, min(MOST_PILOT, seconds), watch, only=_worth_trying)
-    try:
-        report = session.run()
-    except Cancelled:
+    found, last, spent = choose(first, step), LEAST_PILOT, LEAST_PILOT
+    while step != TAKES_NOTHING:
+        # An endless forecast is no reason for an endless pilot; a look that is shorter than the last tells nothing more.
+        seconds = min(min(MOST_PILOT, PILOT_SHARE * found.seconds) - spent, PILOT_GROWS * last)
+        if seconds < last:
+            break
+        session = Session(scene, seconds, watch, only=_worth_trying)
+        try:
+            report = session.run()
+        except Cancelled:
+            if session.cancelled:
+                raise
+            break
         if session.cancelled:
-            raise
-        return found
-    if session.cancelled:
-        raise Cancelled
-    return choose(report, step)
+            raise Cancelled
+        found, last, spent = choose(report, step), seconds, spent + seconds
+    return found
 
 
 def _worth_trying(variant: Variant) -> bool:

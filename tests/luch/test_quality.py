@@ -138,6 +138,31 @@ def test_a_step_that_there_is_not_is_told() -> None:
         render(small(quality="SUPERB"))
 
 
+@pytest.mark.parametrize(
+    ("foretold", "looks"),
+    [((200.0, 30.0), [1.0, 4.0]), ((200.0, 200.0, 200.0), [1.0, 4.0, 15.0]), ((9.0,), [1.0]), ((np.inf,) * 3, [1.0, 4.0, 16.0])],
+)  # fmt: skip
+def test_a_pilot_grows_as_long_as_what_it_foretells_is_worth_it(
+    foretold: tuple[float, ...], looks: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second's look foretold 214 s of a render of 29; a tenth of that was a pilot of 22 s."""
+    taken: list[float] = []
+
+    class Look:
+        cancelled = False
+
+        def __init__(self, scene: Scene, seconds: float, *_: object, **__: object) -> None:
+            taken.append(seconds)
+
+        def run(self) -> float:
+            return foretold[len(taken) - 1]
+
+    monkeypatch.setattr(quality, "Session", Look)
+    monkeypatch.setattr(quality, "choose", lambda told, step: quality.Choice("as set", seconds=told))
+    assert quality.pilot(small(), "GOOD").seconds == foretold[-1]
+    assert taken == looks
+
+
 def test_cancelling_the_pilot_ends_the_render() -> None:
     result = render(small(quality="HIGH"), progress=lambda progress: False)
     assert result.cancelled
