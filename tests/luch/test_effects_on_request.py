@@ -14,11 +14,12 @@ from luch.effects.editing import rewrite
 from luch.effects.forcing import IN_CORE, forcible
 from luch.effects.removal import REMOVALS, without
 from luch.render import Result, render
-from luch.scene import Scene
+from luch.scene import Attribute, Scene
 from luch.scenefile import write_scene
 from luch.shader import ProgramBuilder
 from support.effects import closure, principled, program, scene
 from support.everything import everything
+from support.hair import strands
 
 
 def bits(result: Result, name: str = "Combined") -> Any:
@@ -85,6 +86,25 @@ def test_every_effect_that_can_be_left_out_is_one_and_leaves_a_scene_that_render
     result = render(asking(subject, without_effects=list(REMOVALS)))
     assert set(result.passes) == {"Combined"}
     assert result.passes["Combined"][..., :3].max() == 0.0, "no light is left"
+
+
+def test_hair_and_points_leave_with_what_they_know_of_themselves() -> None:
+    """Attributes of curves that were gone did not fit their domain: no render began."""
+    plain = everything(max_bounces=1)
+    furry = everything(max_bounces=1)
+    fur = strands([[0.0, 0.0, 2.0, 0.2], [0.5, 0.3, 2.4, 0.2]], [[0.2, 0.0, 2.0, 0.2], [0.7, 0.3, 2.4, 0.2]])
+    furry.meshes[0] = replace(
+        furry.meshes[0], curves=fur.curves, spheres=np.array([[0.0, 0.0, 3.0, 0.3]], np.float32),
+        attributes={
+            **furry.meshes[0].attributes,
+            "curves:random": Attribute(np.ones((2, 1), np.float32), "CURVE"),
+            "along": Attribute(np.ones((4, 1), np.float32), "CURVE_POINT"),
+            "of points": Attribute(np.ones((1, 1), np.float32), "SPHERE"),
+        },
+    )  # fmt: skip
+    assert not np.array_equal(bits(render(furry)), bits(render(plain)))
+    shaved = render(asking(furry, without_effects=["hair", "point clouds"]))
+    assert np.array_equal(bits(shaved), bits(render(plain)))
 
 
 def test_a_name_that_is_no_effect_is_told_with_those_that_are() -> None:

@@ -135,6 +135,16 @@ def _still_shape(mesh: Mesh) -> Mesh:
     return replace(mesh, motion_positions=None, motion_normals=None, curves=curves)
 
 
+def _no_primitives(domain: str, **none: Any) -> Callable[[Scene], Scene]:
+    """Of that domain, nor what they know of themselves."""
+
+    def bare(mesh: Mesh) -> Mesh:
+        kept = {name: of for name, of in mesh.attributes.items() if not of.domain.startswith(domain)}
+        return replace(mesh, attributes=kept, **none)
+
+    return lambda scene: replace(scene, meshes=[bare(mesh) for mesh in scene.meshes])
+
+
 def _no_pass(prefix: str) -> Callable[[Scene], Scene]:
     def apply(scene: Scene) -> Scene:
         left = [name for name in scene.film.passes if not name.startswith(prefix)]
@@ -212,12 +222,8 @@ REMOVALS: dict[str, Removal] = {
     "object motion": Removal(_MIDDLE, _still_objects),
     "deformation motion": Removal(_MIDDLE, _still_shapes),
     "aperture blades": Removal("a round aperture", _camera(blades=0)),
-    "point clouds": Removal(
-        "nothing", lambda scene: replace(scene, meshes=[replace(mesh, spheres=None) for mesh in scene.meshes])
-    ),
-    "hair": Removal(
-        "nothing", lambda scene: replace(scene, meshes=[replace(mesh, curves=None) for mesh in scene.meshes])
-    ),
+    "point clouds": Removal("nothing", _no_primitives("SPHERE", spheres=None)),
+    "hair": Removal("nothing", _no_primitives("CURVE", curves=None)),
     "volumes": Removal("empty space", _no_volumes),
     "volume bounces": Removal("light scatters once", _settings(volume_bounces=0)),
     "indirect light": Removal("direct light alone", _settings(max_bounces=0)),
