@@ -18,12 +18,13 @@ FARTHEST_M = 1e37  # LARGEST_COORDINATE of luch/math/bounds.h
 def warnings(stats: Mapping[str, Any], scene: Scene) -> list[str]:
     """One sentence for each thing that is not drawn as it is in the scene."""
     told = list(stats.get("image_warnings", []))
+    owners = _owners(stats, scene)
     for mesh, invalid, too_far, _, _ in stats.get("left_out", []):
         if invalid:
-            told.append(f"{_owner(scene, mesh)}: {_count(invalid, 'face')} with a vertex that is not finite or not there"
+            told.append(f"{owners[mesh]}: {_count(invalid, 'face')} with a vertex that is not finite or not there"
                         " are left out. Remove them with Mesh > Clean Up.")  # fmt: skip
         if too_far:
-            told.append(f"{_owner(scene, mesh)}: {_count(too_far, 'face')} reaching farther than {FARTHEST_M:g} m are"
+            told.append(f"{owners[mesh]}: {_count(too_far, 'face')} reaching farther than {FARTHEST_M:g} m are"
                         " left out. Scale the object down.")  # fmt: skip
     for index in dict.fromkeys(stats.get("dropped_objects", [])):
         told.append(f'Object "{scene.objects[index].name}": its transform leaves no surface, so it is left out. '
@@ -34,11 +35,12 @@ def warnings(stats: Mapping[str, Any], scene: Scene) -> list[str]:
 def report(stats: Mapping[str, Any], scene: Scene) -> list[str]:
     """What was left out and is missed by nobody, one sentence a mesh."""
     told = []
+    owners = _owners(stats, scene)
     for mesh, _, _, empty, copies in stats.get("left_out", []):
         parts = [f"{_count(empty, 'face')} without area"] if empty else []
         parts += [f"{_count(copies, 'face')} on top of another that is the same"] if copies else []
         if parts:
-            told.append(f"{_owner(scene, mesh)}: {' and '.join(parts)} left out.")
+            told.append(f"{owners[mesh]}: {' and '.join(parts)} left out.")
     return told
 
 
@@ -46,9 +48,10 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}s" if number != 1 else f"1 {noun}"
 
 
-def _owner(scene: Scene, mesh: int) -> str:
-    """The first object that shows the mesh."""
-    for subject in scene.objects:
-        if subject.mesh == mesh:
-            return f'Object "{subject.name}"'
-    return f'Mesh "{scene.meshes[mesh].name}"'
+def _owners(stats: Mapping[str, Any], scene: Scene) -> dict[int, str]:
+    """Of each mesh that something was left out of: the first object that shows it."""
+    meshes = [mesh for mesh, *_ in stats.get("left_out", [])]
+    if not meshes:
+        return {}
+    objects = {subject.mesh: f'Object "{subject.name}"' for subject in reversed(scene.objects)}
+    return {mesh: objects.get(mesh, f'Mesh "{scene.meshes[mesh].name}"') for mesh in meshes}
