@@ -228,20 +228,20 @@ struct Reader {
         if (positions.ndim() != 3 || positions.shape(0) < 2 || size_t(positions.shape(1)) != in.vertex_count ||
             positions.shape(2) != 3)
             throw std::invalid_argument("Mesh \"" + in.name + "\": motion_positions must be (K, V, 3), K at least 2.");
-        bool alike = all_alike(positions, in.positions);
-        if (alike && !in.normals) return;
+        bool stands = all_alike(positions, in.positions);
+        const float* normals = nullptr;
+        if (in.normals) {
+            size_t rows = in.normals_domain == Domain::POINT ? in.vertex_count : in.triangle_count * 3;
+            auto given = keep.array<float>(mesh.attr("motion_normals"));
+            if (size_t(given.size()) != size_t(positions.shape(0)) * rows * 3)
+                throw std::invalid_argument("Mesh \"" + in.name + "\": motion_normals do not fit motion_positions.");
+            normals = given.data();
+            stands = stands && all_alike(given, in.normals);
+        }
+        if (stands) return;
         in.motion_keys = u32(positions.shape(0));
         in.motion_positions = positions.data();
-        if (!in.normals) return;
-        size_t rows = in.normals_domain == Domain::POINT ? in.vertex_count : in.triangle_count * 3;
-        auto normals = keep.array<float>(mesh.attr("motion_normals"));
-        if (size_t(normals.size()) != in.motion_keys * rows * 3)
-            throw std::invalid_argument("Mesh \"" + in.name + "\": motion_normals do not fit motion_positions.");
-        if (alike && all_alike(normals, in.normals)) {
-            in.motion_keys = 0, in.motion_positions = nullptr;
-            return;
-        }
-        in.motion_normals = normals.data();
+        in.motion_normals = normals;
     }
 
     void read_material(const py::object& material) {

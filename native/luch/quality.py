@@ -123,7 +123,7 @@ def pilot(scene: Scene, step: str, watch: Callable[[Told], bool] | None = None) 
     found, last, spent = choose(first, step), LEAST_PILOT, LEAST_PILOT
     while step != TAKES_NOTHING:
         # An endless forecast is no reason for an endless pilot; a look that is shorter than the last tells nothing more.
-        seconds = min(min(MOST_PILOT, PILOT_SHARE * found.seconds) - spent, PILOT_GROWS * last)
+        seconds = min(MOST_PILOT - spent, PILOT_SHARE * found.seconds - spent, PILOT_GROWS * last)
         if seconds < last:
             break
         session = Session(scene, seconds, watch, only=_worth_trying)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from luch.accel import KINDS, Accel, Device, Kind
 from support import closed_meshes
-from support.accel_meshes import Mesh, icosphere, rows, separate, soup
+from support.accel_meshes import F32, Mesh, icosphere, rows, separate, soup
+from support.asked import every_device, every_kind
 from support.instances import Scene
 
-every_kind = pytest.mark.parametrize("kind", KINDS)
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 TREES: list[Kind] = [kind for kind in KINDS if kind not in ("BRUTE_FORCE", "GRID")]
 AT_ONCE = 50_000
 # Rays a mesh; `build.py bench leaks` traces up to 1e8.
@@ -53,9 +52,9 @@ def test_06_no_ray_leaves_a_ball_of_any_size(rays: int, kind: Kind, device: Devi
         assert leaks_of(mesh, kind, device, power + 18, rays) == 0, f"1e{power}"
 
 
-def work(mesh: Mesh, kind: Kind, rays: np.ndarray, device: Device = "CPU") -> float:  # type: ignore[type-arg]
+def work(accel: Accel, rays: F32) -> float:
     """Nodes and primitives a ray."""
-    counts = Accel(*mesh, kind=kind, device=device).count(rays)
+    counts = accel.count(rays)
     return (counts["nodes"] + counts["primitives"]) / len(rays)
 
 
@@ -73,8 +72,7 @@ def test_08_a_fan_of_a_hundred_times_the_slivers_costs_a_ray_twenty_times_as_muc
     few, many = (Accel(*closed_meshes.bipyramid(sides), kind=kind, device=device) for sides in (1000, 100_000))
     for origins in (np.zeros((300, 3)), inside):
         rays = rows(origins, directions)
-        spent = [sum(accel.count(rays)[part] for part in ("nodes", "primitives")) for accel in (few, many)]
-        assert spent[1] <= 20 * spent[0]
+        assert work(many, rays) <= 20 * work(few, rays)
     assert many.stats["bytes"] <= 450 * 200_000, "eight pieces a sliver"
     assert leaks_through(many, closed_meshes.bipyramid(100_000), 8) == 0
 
@@ -125,8 +123,7 @@ def test_31_copies_of_one_triangle_cost_no_more_than_as_many_random_ones(
     eye = np.column_stack([rng.uniform(-1, 1, (200, 2)), np.full(200, 5.0)])
     rays = rows(eye, rng.uniform(-0.5, 0.5, (200, 3)) - eye)
     same, random = (Accel(*mesh, kind=kind, device=device) for mesh in (copies(count), soup(count, 0.02)))
-    spent = [sum(accel.count(rays)[part] for part in ("nodes", "primitives")) for accel in (same, random)]
-    assert spent[0] <= 3 * spent[1]
+    assert work(same, rays) <= 3 * work(random, rays)
     assert same.stats["bytes"] <= 1.5 * random.stats["bytes"]
     assert (same.closest(rays)[1] <= 0).all(), "the first of them counts"
 
@@ -144,7 +141,7 @@ def test_32_triangles_in_one_plane_cost_no_more_than_as_many_random_ones(
     eye = np.column_stack([rng.uniform(-1, 1, (200, 2)), np.full(200, 5.0)])
     rays = rows(eye, np.column_stack([rng.uniform(-1, 1, (200, 2)), np.zeros(200)]) - eye)
     plane, random = (Accel(*mesh, kind=kind, device=device) for mesh in (flat, spread))
-    spent = [sum(accel.count(rays)[part] for part in ("nodes", "primitives")) for accel in (plane, random)]
+    spent = [work(accel, rays) for accel in (plane, random)]
     taken = [accel.stats["bytes"] + accel.stats.get("primitive_bytes", 0) for accel in (plane, random)]
     print(f"{kind}, {count}: {spent[0] / spent[1]:.2f} times the work, {taken[0] / taken[1]:.2f} the memory")
     assert spent[0] <= 3 * spent[1]
@@ -186,4 +183,5 @@ def test_34_a_stadium_around_a_teapot_costs_its_rays_little_anywhere(
     rng = np.random.default_rng(34)
     eye = np.float32([0.03, 0, 0])
     rays = rows(np.tile(eye + shift, (500, 1)), closed_meshes.targets(ball, rng, 500, 3) - eye)
-    assert work(many, kind, rays, device) <= 3.0 * max(work(alone, kind, rays, device), 2.0)
+    among, by_itself = (Accel(*mesh, kind=kind, device=device) for mesh in (many, alone))
+    assert work(among, rays) <= 3.0 * max(work(by_itself, rays), 2.0)

@@ -13,9 +13,9 @@ from luch.scene import F32, Camera, Film, Instances, Material, Mesh, Object, Sce
 from luch.shader import ProgramBuilder, float_word
 from numpy.typing import NDArray
 from support import accel_meshes, closed_meshes
+from support.asked import every_device
 from support.hard_scenes import glow, mesh_of, scene_of
 
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 KINDS = ["PERSP", "ORTHO", "EQUIRECTANGULAR"]
 
 

@@ -14,6 +14,7 @@ import pytest
 from luch.render import render
 from luch.scene import F32, F64, Instances, Mesh, Scene
 from support import accel_meshes
+from support.asked import every_device
 from support.hard_geometry import (
     ball_inside,
     camera_above,
@@ -41,7 +42,6 @@ from support.hard_scenes import (
     scene_of,
 )
 
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 OFFSETS = [0.0, 1e3, 1e5, 1e6, 1e7]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from luch.scene import F64, Mesh
 from support import accel_meshes
+from support.asked import every_device
 from support.hard_geometry import (
     ball_inside,
     camera_above,
@@ -24,7 +25,6 @@ from support.hard_geometry import (
 )
 from support.hard_scenes import HERE, at, diffuse, glass, mesh_of, mirror, picture, scene_of
 
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 every_kind = pytest.mark.parametrize(
     "kind", ["BVH2", "BVH2_STACKLESS", "CWBVH", "KD_TREE", "HIERARCHICAL_GRID", "GRID"]
 )

@@ -9,12 +9,11 @@ import pytest
 from luch.render import render
 from luch.scene import Camera, Image, Light, Material
 from luch.shader import ProgramBuilder
+from support.asked import every_device
 from support.effects import program
 from support.hard_geometry import quad
 from support.hard_lights import glass_against_nothing, hot_texel, lit_floor, nested_dielectrics, sky_over_floor
 from support.hard_scenes import at, diffuse, even_world, glow, looking, picture, scene_of
-
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 
 
 @every_device

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from luch.render import Result, render
 from luch.scene import Scene, Shutter
+from support.asked import every_device
 from support.everything import everything
 from support.moving_square import EVEN, WAYS, WIDTH, expected, square
 
 SPEED = 3.0  # metres a frame
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 every_way = pytest.mark.parametrize("way", WAYS)
 
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from luch import core
-from luch.accel import KINDS, Accel, Device, Kind
+from luch.accel import Accel, Device, Kind
 from support import closed_meshes
 from support.accel_meshes import F32, aimed_rays, cube, icosphere, random_rays, rows, separate, soup
+from support.asked import every_device, every_kind
 from support.hard_rays import assert_same_hits
 
-every_kind = pytest.mark.parametrize("kind", KINDS)
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 # Rays a case: what each kind traces in some tenths of a second on one core.
 COUNT: dict[str, int] = {"BVH": 200_000, "BVH2": 50_000, "BRUTE_FORCE": 50}
 OTHERS = 20_000

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from luch.accel import KINDS, QUALITIES, Accel, Device, Kind, Quality
 from support.accel_meshes import HARD_MESHES, aimed_rays, differences, icosphere, random_rays
+from support.asked import every_device
 from support.hard_rays import OF_CELLS, OF_TREES, assert_same_hits, bits_differ, hard_rays, truth
 
 TREES: tuple[Kind, ...] = ("BVH2", "BVH2_STACKLESS", "CWBVH")
 CELLS: tuple[Kind, ...] = ("KD_TREE", "GRID", "HIERARCHICAL_GRID")
 FLAT = ("collinear", "points")  # without area: no ray meets them
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 
 
 @pytest.mark.parametrize("name", HARD_MESHES)

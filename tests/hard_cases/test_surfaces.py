@@ -15,9 +15,9 @@ from luch.render import render
 from luch.scene import F32, Camera, Film, Instances, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder
 from support import accel_meshes
+from support.asked import every_device
 from support.closures import ROUGHNESS
 
-every_device = pytest.mark.parametrize("device", ["CPU", pytest.param("CUDA", marks=pytest.mark.cuda)])
 SIZE = 12  # pixels
 GGX, BECKMANN, MULTI_GGX = 0, 1, 2  # the order of Microfacets in bsdf/params.h
 

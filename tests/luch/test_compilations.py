@@ -88,6 +88,7 @@ def test_kernels_that_do_not_compile_are_told_by_every_frame_that_wants_them(slo
 
 
 @pytest.mark.promise(8)
+# luch.cuda.compiler asks glibc alone: malloc_trim is a function of its own.
 @pytest.mark.skipif(sys.platform != "linux", reason="of glibc's heap")
 def test_what_a_compiler_took_of_the_heap_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     libc = ctypes.CDLL(None)

@@ -68,6 +68,7 @@ void TwoLevel::count() {
         stats_.bytes += own.bytes;
     }
 }
+
 std::unique_ptr<Accel> Accel::build(const SceneView& scene, const std::vector<std::vector<u8>>& flags, ThreadPool& pool,
                                     const AccelChoice& choice, u64 flatten_triangles) {
     return std::make_unique<TwoLevel>(scene, flags, pool, choice, flatten_triangles);

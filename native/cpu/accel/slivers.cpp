@@ -45,51 +45,63 @@ double waste(const Primitives& all, const PrimBox& box) {
     return std::max(0.0, area_of(box) - FILLED * covered);
 }
 
-template <class Of>
-double sum_of(size_t count, ThreadPool& pool, const Of& of) {
-    std::vector<double> parts((count + CHUNK - 1) / CHUNK);
+// Of some boxes: their area, what of it is in vain, and how many have such a part.
+struct Waste {
+    double area = 0.0, needless = 0.0, roots = 0.0, slivers = 0.0;
+};
+
+template <class Add>
+Waste sum_of(size_t count, ThreadPool& pool, const Add& add) {
+    std::vector<Waste> parts((count + CHUNK - 1) / CHUNK);
     pool.parallel_for(count, CHUNK, [&](size_t begin, size_t end, unsigned) {
-        double sum = 0.0;
-        for (size_t i = begin; i < end; ++i) sum += of(i);
-        parts[begin / CHUNK] = sum;
+        for (size_t i = begin; i < end; ++i) add(i, parts[begin / CHUNK]);
     });
-    double sum = 0.0;
-    for (double part : parts) sum += part;
+    Waste sum;
+    for (const Waste& part : parts) {
+        sum.area += part.area;
+        sum.needless += part.needless;
+        sum.roots += part.roots;
+        sum.slivers += part.slivers;
+    }
     return sum;
 }
 
-// k pieces waste a k-th: of all ways to share the pieces out, as the root of the waste leaves the least.
-struct Shares {
-    const Primitives& all;
-    double of_root = 0.0;  // pieces for a root of the waste of 1; 0: nothing is cut
+double boxes_met(const PrimBox* boxes, size_t count, double root_area, ThreadPool& pool) {
+    if (!(root_area > 0.0)) return 0.0;
+    return sum_of(count, pool, [&](size_t i, Waste& sum) { sum.area += area_of(boxes[i]); }).area / root_area;
+}
 
-    u32 pieces(const PrimBox& box) const {
-        return u32(std::clamp(of_root * std::sqrt(waste(all, box)), 1.0, MOST_PIECES));
-    }
+// How a mesh's slivers are cut: pieces on the mean over those that gain, and those of one for a root of its waste of 1. k
+// pieces waste a k-th: of all ways to share the pieces out, as the root of the waste leaves the least.
+struct Cutting {
+    double pieces = 1.0, of_root = 0.0;
 };
 
-double mean_pieces(double needless, double slivers) {
-    return std::min({needless / MANY_BOXES, MOST_PIECES, 1.0 + MOST_ADDED / slivers});
+Cutting cutting_of(const Primitives& all, const PrimBox* boxes, size_t count, ThreadPool& pool) {
+    const double root_area = area_of_all(boxes, count, pool);
+    if (boxes_met(boxes, count, root_area, pool) < MANY_BOXES) return {};
+    Waste sum = sum_of(count, pool, [&](size_t i, Waste& part) {
+        double needless = waste(all, boxes[i]);
+        part.needless += needless;
+        part.roots += std::sqrt(needless);
+        part.slivers += needless > 0.0 ? 1.0 : 0.0;
+    });
+    double worth = sum.needless / root_area / MANY_BOXES;
+    if (worth <= 1.0) return {};
+    double pieces = std::min({worth, MOST_PIECES, 1.0 + MOST_ADDED / sum.slivers});
+    return {pieces, pieces * sum.slivers / sum.roots};
 }
 
 }  // namespace
 
 double boxes_met(const PrimBox* boxes, size_t count, ThreadPool& pool) {
-    double all = area_of_all(boxes, count, pool);
-    return all > 0.0 ? sum_of(count, pool, [&](size_t i) { return area_of(boxes[i]); }) / all : 0.0;
-}
-
-double sliver_pieces(const Primitives& all, const PrimBox* boxes, size_t count, ThreadPool& pool) {
-    if (boxes_met(boxes, count, pool) < MANY_BOXES) return 1.0;
-    double needless = sum_of(count, pool, [&](size_t i) { return waste(all, boxes[i]); });
-    double slivers = sum_of(count, pool, [&](size_t i) { return waste(all, boxes[i]) > 0.0 ? 1.0 : 0.0; });
-    return std::max(1.0, mean_pieces(needless / area_of_all(boxes, count, pool), std::max(slivers, 1.0)));
+    return boxes_met(boxes, count, area_of_all(boxes, count, pool), pool);
 }
 
 double sliver_pieces(const StructureInput& input, ThreadPool& pool) {
     if (input.count == 0) return 1.0;
     HugeArray<PrimBox> boxes = boxes_of(input, pool);
-    return sliver_pieces(input.primitives, boxes.data(), boxes.size(), pool);
+    return cutting_of(input.primitives, boxes.data(), boxes.size(), pool).pieces;
 }
 
 HugeArray<PrimBox> boxes_of(const StructureInput& input, ThreadPool& pool) {
@@ -104,17 +116,14 @@ HugeArray<PrimBox> boxes_of(const StructureInput& input, ThreadPool& pool) {
 }
 
 HugeArray<PrimBox> cut_slivers(const Primitives& all, HugeArray<PrimBox> boxes, size_t* count, ThreadPool& pool) {
-    double mean = sliver_pieces(all, boxes.data(), *count, pool);
-    if (mean <= 1.0) return boxes;
-    double roots = sum_of(*count, pool, [&](size_t i) { return std::sqrt(waste(all, boxes[i])); });
-    double slivers = sum_of(*count, pool, [&](size_t i) { return waste(all, boxes[i]) > 0.0 ? 1.0 : 0.0; });
-    Shares shares = {all, mean * slivers / roots};
+    const Cutting cutting = cutting_of(all, boxes.data(), *count, pool);
+    if (cutting.pieces <= 1.0) return boxes;
     Clipper clipper(all);
     std::vector<std::vector<PrimBox>> made((*count + CHUNK - 1) / CHUNK);
     pool.parallel_for(*count, CHUNK, [&](size_t begin, size_t end, unsigned) {
         for (size_t i = begin; i < end; ++i) {
             const PrimBox& whole = boxes[i];
-            u32 pieces = shares.pieces(whole);
+            u32 pieces = u32(std::clamp(cutting.of_root * std::sqrt(waste(all, whole)), 1.0, MOST_PIECES));
             if (pieces == 1) {
                 made[begin / CHUNK].push_back(whole);
                 continue;

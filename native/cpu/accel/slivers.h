@@ -18,7 +18,6 @@ constexpr double MANY_BOXES = 256.0;
 
 // Into how many pieces slivers are worth cutting, on the mean over those of them that gain: 1 where few boxes are
 // needless, and no more than memory allows.
-double sliver_pieces(const Primitives& all, const PrimBox* boxes, size_t count, ThreadPool& pool);
 double sliver_pieces(const StructureInput& input, ThreadPool& pool);
 
 // The boxes of primitives, in order of refs.
