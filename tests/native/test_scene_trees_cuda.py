@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from luch.accel import STRUCTURES
+from luch.cuda.compiler import source_folders
+from luch.cuda.scene_kernels import structure_flags
 from luch.cuda.trace import SceneTracer, TreesTooDeep
 from support.accel_meshes import icosphere, random_rays, rows, soup
-from support.cuda_on_cpu import GPU
+from support.cuda_on_cpu import GPU, compiles
 from support.instances import ALL, Scene, crowd, placed
 
 from buildtools.kernels import faults, table
@@ -130,3 +132,9 @@ def test_ptx_of_scenes_obeys_the_rules_of_precision() -> None:
     assert not faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f32")
     assert faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f64")
     assert faults(("TRACE_CWBVH", "FAST"), "mul.f64")
+
+
+@pytest.mark.parametrize("kind", STRUCTURES)
+def test_stages_can_trace_single_rays_through_any_structure(kind: str) -> None:
+    """Those that look through surfaces one by one: four structures' scenes did not compile."""
+    assert compiles('#include "render/one_ray.cuh"\n', list(source_folders()), structure_flags(kind))

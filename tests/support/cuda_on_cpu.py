@@ -123,6 +123,14 @@ def compile_module(
     return str(library)
 
 
+def compiles(text: str, include: list[Path], defines: Sequence[str]) -> bool:
+    """Whether device code is understood; nothing of it runs."""
+    options = ["-DLUCH_PRECISION=WATERTIGHT", *(f"-I{path}" for path in include), *defines]
+    command = ["c++", *FLAGS, "-fsyntax-only", "-x", "c++", *options, "-"]
+    whole = f'#include "{HERE / "cuda_on_cpu.h"}"\n{text}'
+    return subprocess.run(command, input=whole, text=True).returncode == 0
+
+
 def _types(parameters: str) -> list[str]:
     """Of a kernel's parameters, as they stand in its source."""
     words = [

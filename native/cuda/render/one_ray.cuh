@@ -1,5 +1,6 @@
 // Single rays from within a stage.
 #pragma once
+#include LUCH_STRUCTURE_HEADER
 #include "luch/accel/two_level.h"
 
 namespace luch {

@@ -6,7 +6,8 @@
 #define LUCH_PLAN_CURVES 1
 #endif
 #ifndef LUCH_STRUCTURE
-#define LUCH_STRUCTURE Cwbvh
+#define LUCH_STRUCTURE Cwbvh  // and where it stands
+#define LUCH_STRUCTURE_HEADER "luch/accel/cwbvh.h"
 #endif
 #include "render/exits.cuh"
 #include "render/light.cuh"

@@ -168,8 +168,8 @@ class DeviceRenderer(HostFilm):
         self._cancelled = self._abandoned = False
         self._waves_done = self._waves = 0
         self._counts = {"paths": 0, "rays": 0, "shadow_rays": 0}
-        self._trace_seconds = 0.0
-        self._upload_seconds = 0.0
+        self._trace_seconds = self._upload_seconds = 0.0
+        self._uncharged = 0.0  # since when no time was shared among pixels, by the clock of perf_counter
         self._merged = True
 
     @property
@@ -332,7 +332,8 @@ class DeviceRenderer(HostFilm):
 
     def _render(self, work: Sequence[Part]) -> bool:
         enter_context()
-        began, waves = time.perf_counter(), list(self._waves_of(work))
+        began = self._uncharged = time.perf_counter()
+        waves = list(self._waves_of(work))
         charging = self._clocks.charging_seconds
         self._waves_done, self._waves = 0, len(waves)
         for pixels, wave in waves:
@@ -365,7 +366,7 @@ class DeviceRenderer(HostFilm):
             self._memory.mark(sample, _on_device(pixels))
 
     def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int, listed: Any) -> None:
-        memory, rays, began = self._memory, pixels * samples, time.perf_counter()
+        memory, rays = self._memory, pixels * samples
         self._merged = False
         self._counts["paths"] += rays
         self._launch(
@@ -386,7 +387,8 @@ class DeviceRenderer(HostFilm):
             rays = memory.count("rays")
         if self._timed:
             those = slice(pixel, pixel + pixels) if listed is None else listed[pixel : pixel + pixels]
-            self._clocks.charge(memory, those, pixels, samples, time.perf_counter() - began)
+            self._clocks.charge(memory, those, pixels, samples, time.perf_counter() - self._uncharged)
+            self._uncharged = time.perf_counter()
 
     def _trace_round(self, turn: int, rays: int) -> int:
         """One event of every path; returns how many shadow rays were cast."""

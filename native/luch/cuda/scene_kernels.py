@@ -19,6 +19,12 @@ STAGES = "RENDER_STAGES"
 INTERPRETER_REGISTERS = 256
 
 
+def structure_flags(kind: str) -> list[str]:
+    """For kernels that trace single rays themselves. kind: a structure, as "KD_TREE"."""
+    name = "".join(part.capitalize() for part in kind.split("_"))
+    return [f"-DLUCH_STRUCTURE={name}", f"-DLUCH_STRUCTURE_HEADER=<luch/accel/{kind.lower()}.h>"]
+
+
 class SceneKernels:
     """``kernel(name)`` is the best that is there at the moment; asked anew at every wave."""
 
@@ -29,11 +35,10 @@ class SceneKernels:
         programs = [Linked(*row) for row in facts["programs"]]
         instructions = np.frombuffer(arrays["instructions"], INSTRUCTION)
         self._text = source(programs, instructions, np.frombuffer(arrays["operands"], np.uint32))
-        structure = "".join(part.capitalize() for part in facts["structure"].split("_"))
         self._flags = [
             "-DLUCH_SCENE_PROGRAMS",
             f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
-            f"-DLUCH_STRUCTURE={structure}",
+            *structure_flags(facts["structure"]),
         ]
         self._view = kind_of_view(scene)
         self._operations = operations(programs, instructions)

@@ -2,7 +2,7 @@
 
 A kernel's time, by CUDA's events, is shared among paths as their threads counted clock cycles in it: waiting for memory
 and for other lanes of the warp counts as theirs. What lies between those kernels (beginning paths, sorting, launches)
-is shared in the same proportion, so that a wave's pixels add up to the wave's time. Sharing takes some milliseconds a
+is shared in the same proportion, so that pixels add up to the time of tracing. Sharing takes some milliseconds a
 wave by itself; they belong to no pixel, and not to the time of tracing.
 """
 
