@@ -15,7 +15,7 @@ import pytest
 from luch.accel import Accel
 from luch.cuda import compiler, device
 from support import cuda_on_cpu
-from support.accel_meshes import HARD_MESHES, aimed_rays, random_rays, rows, soup
+from support.accel_meshes import HARD_MESHES, aimed_rays, icosphere, random_rays, rows, soup
 from support.cuda_on_cpu import FIBERS, GPU
 from support.hard_rays import assert_same_bits, device_rays
 
@@ -121,6 +121,27 @@ def test_tree_built_on_the_device_gives_brute_force_hits(place: str, name: str) 
     good = Accel(*mesh, kind="CWBVH", device="CUDA")
     if name != "identical":  # of copies the host's builders keep one, the device's keeps all
         assert ours.count(rays)["boxes"] <= 2.5 * good.count(rays)["boxes"]
+
+
+def test_a_flat_scene_is_not_cut_along_its_short_axis_first(place: str) -> None:
+    """Twelve balls on a wide floor: with a scale for each axis rays visited 1.4 times as many boxes."""
+    ball, sides = icosphere(2)
+    places = np.stack(np.meshgrid(2.5 * np.arange(4.0), 2.5 * np.arange(3.0), [1.0]), -1).reshape(-1, 3)
+    floor = np.array([[-40, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]])
+    points = np.concatenate([*(ball + at for at in places), floor]).astype(np.float32)
+    first = len(places) * len(ball)
+    triangles = np.concatenate(
+        [
+            *(sides + len(ball) * k for k in range(len(places))),
+            [[first, first + 1, first + 2], [first, first + 2, first + 3]],
+        ]
+    )
+    rays = aimed_rays((points[:first], triangles[:-2].astype(np.uint32)), 400)
+    fast, good = (
+        Accel(points, triangles.astype(np.uint32), kind="CWBVH", quality=quality, device="CUDA").count(rays)
+        for quality in ("FAST", "NORMAL")
+    )
+    assert fast["boxes"] <= 1.2 * good["boxes"]
 
 
 def test_builder_on_the_device_drops_what_the_cpu_drops(place: str) -> None:

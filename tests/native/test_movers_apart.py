@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import core
+from luch.cuda.device import cupy
+from luch.cuda.trace import HIT, SceneTracer
 from numpy.typing import NDArray
 from support.accel_meshes import icosphere, random_rays, rows
 from support.instances import ALL, NO_KINDS, Scene, placed
@@ -50,6 +52,20 @@ def test_a_mover_that_no_ray_comes_near_costs_no_node_and_no_primitive(shadows: 
     still = ball_below(False).build(flatten=FLATTEN).work(rays, times, shadows)
     assert still["primitives"] > len(rays)
     assert ball_below(True).build(flatten=FLATTEN).work(rays, times, shadows) == still
+
+
+def test_on_a_device_the_kernel_for_what_moves_gets_those_rays_alone_that_may_meet_it(place: str) -> None:
+    trees = ball_below(True).build("CWBVH", for_device=True, flatten=FLATTEN)
+    tracer = SceneTracer(*trees.device_image(), "CWBVH", "WATERTIGHT", trees.has_world_apart(), moves=True)
+    cp, above = cupy(), rays_above()
+    down = rows(np.array([6.0, 0.0, -9.0]), np.array([[0, 0, -1.0]]))  # at the seventh
+    rays = cp.asarray(np.concatenate([above, down]))
+    for trace, size in ((tracer.closest, HIT.itemsize), (tracer.any, 1)):
+        results, near = cp.zeros(len(rays) * size, np.uint8), cp.zeros(len(rays), np.uint32)
+        counts = cp.asarray(np.array([len(rays), 0, 0, 0], np.uint32))
+        trace(rays.data.ptr, 0, results.data.ptr, counts.data.ptr, counts.data.ptr + 4, near=near.data.ptr)
+        assert counts.get()[3] == 1 and near.get()[0] == len(above)
+        assert results.get()[-size:].any()
 
 
 def movers(count: int) -> Moving:

@@ -16,7 +16,7 @@ __device__ __forceinline__ u64 spread_bits(u64 x) {
 }
 
 __device__ __forceinline__ u64 cell_of(const BuildTask& task, float lo, float hi, int axis) {
-    float x = ((lo * 0.5f + hi * 0.5f) - task.lo[axis]) * task.scale[axis];
+    float x = ((lo * 0.5f + hi * 0.5f) - task.lo[axis]) * task.scale;
     return u64(clamp_f(x, 0.0f, 2097151.0f));  // NaN: 0
 }
 

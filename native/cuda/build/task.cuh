@@ -35,7 +35,7 @@ struct BuildTask {
     u32* next_items;
     CwbvhNode* wide;
     LeafPrimitive* leaves;
-    float lo[3], scale[3];  // of the primitives' middles to 0..2^21
+    float lo[3], scale;    // of the primitives' middles to 0..2^21
     u32 count;              // of what the kernel works on: a thread each
 };
 

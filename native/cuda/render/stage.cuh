@@ -1,20 +1,15 @@
 // What the stages of the wavefront share: who a thread is, appending to queues, a program at one point.
 #pragma once
 #include "luch/integrator/wavefront.h"
+#include "render/append.cuh"
 #include "render/clock.cuh"
 #include "render/launch.cuh"
 #include "render/programs.cuh"
 
 namespace luch {
 
-// A place at the end of a queue; which one is a matter of chance, and nothing depends on it. The threads of a warp that
-// come here together count once, as additions to one address wait for each other, and get places side by side.
 __device__ __forceinline__ u32 append(const Wavefront& wave, WaveCounter queue) {
-    u32 together = __activemask(), lane = threadIdx.x % 32u;
-    int first = lowest_bit(together);
-    u32 place = 0;
-    if (int(lane) == first) place = atomicAdd(in_global(wave.counters) + queue, u32(popcount(together)));
-    return __shfl_sync(together, place, first) + u32(popcount(together & ((1u << lane) - 1u)));
+    return append_to(in_global(wave.counters) + queue);
 }
 
 __device__ __forceinline__ void add_total(const Wavefront& wave, WaveTotal total, u64 amount) {

@@ -11,6 +11,7 @@
 #endif
 #include "luch/accel/two_level.h"
 #include "rays/structure.cuh"
+#include "render/append.cuh"
 
 namespace luch {
 
@@ -21,11 +22,12 @@ struct TraceTask {
     Hit* hits;  // of trace_closest, by ray
     u8* blocked;  // of trace_any: Blocked values, by ray
     const u32* count;  // rays
-    // 0 when the kernel begins; how many rays were fetched when it ends, at least. Two: the second is of the kernel that
-    // comes after, for what moves.
+    // 0 when the kernel begins; how many rays were fetched when it ends, at least. Three: the second is of the kernel
+    // that comes after, for what moves, the third counts near_movers.
     u32* next;
     const float* times;  // of each ray; null: the shutter's middle. Read where LUCH_PLAN_MOTION is 1
     u32* ticks;  // of each ray, its clock cycles. Written where LUCH_TIMED_RAYS is 1
+    u32* near_movers;  // rays that the second kernel is to trace: the first writes them
 };
 
 __device__ __forceinline__ u32 ray_count(const TraceTask& task) { return __ldg(task.count); }
@@ -42,6 +44,13 @@ __device__ __forceinline__ Ray ray_of(const TraceTask& task, u32 i) {
     return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, b.w};
 }
 __device__ __forceinline__ void store_blocked(const TraceTask& task, u32 i, u8 blocked) { task.blocked[i] = blocked; }
+
+// How many rays the kernel after the world's has to trace, and which.
+__device__ __forceinline__ u32 near_count(const TraceTask& task) { return __ldg(task.next + 2); }
+__device__ __forceinline__ u32 near_ray(const TraceTask& task, u32 i) { return __ldg(task.near_movers + i); }
+__device__ __forceinline__ void note_near_movers(const TraceTask& task, u32 i) {
+    task.near_movers[append_to(task.next + 2)] = i;
+}
 
 // Calls trace(i) for every ray of the task, a warp's worth at a time.
 template <class Trace>

@@ -12,11 +12,14 @@ struct SceneRays {
     const TraceTask& task;
 };
 
-__device__ __forceinline__ u32 ray_count(const SceneRays& rays) { return ray_count(rays.task); }
-// After the kernel of what stands still: the next of the task's two counters.
-__device__ __forceinline__ u32* next_ray(const SceneRays& rays) {
-    return rays.task.next + (rays.scene.world_visibility != 0u);
+// After the kernel of what stands still: those rays that it has left for this one, by the next of the task's counters.
+__device__ __forceinline__ bool comes_after(const SceneRays& rays) {
+    return plan::MOTION && rays.scene.world_visibility != 0u;
 }
+__device__ __forceinline__ u32 ray_count(const SceneRays& rays) {
+    return comes_after(rays) ? near_count(rays.task) : ray_count(rays.task);
+}
+__device__ __forceinline__ u32* next_ray(const SceneRays& rays) { return rays.task.next + comes_after(rays); }
 
 template <Precision P>
 struct SceneAside : RayClock {
@@ -60,7 +63,8 @@ struct SceneWalker {
     u8 blocked;
     bool busy;
 
-    __device__ __forceinline__ void begin(const SceneRays& rays, u32 i, SplitStack* stack) {
+    __device__ __forceinline__ void begin(const SceneRays& rays, u32 fetched, SplitStack* stack) {
+        u32 i = comes_after(rays) ? near_ray(rays.task, fetched) : fetched;
         Ray ray = ray_of(rays.task, i);
         aside->start();
         busy = clamp_interval(&ray) && rays.scene.top.node_count != 0;
@@ -68,7 +72,7 @@ struct SceneWalker {
         aside->best = {ray.t_max, NONE, 0.0f, 0.0f};
         blocked = BLOCKED_NOT;
         if (!busy) return finish(rays);
-        if (rays.scene.world_visibility != 0u) begin_after_world(rays, i);
+        if (comes_after(rays)) begin_after_world(rays, i);
         if (!busy) return;
         if (passes_movers_by(rays.scene, ray, aside->best.t)) return finish(rays);
         aside->t_min = ray.t_min;
@@ -89,7 +93,7 @@ struct SceneWalker {
     }
     __device__ __forceinline__ void finish(const SceneRays& rays) {
         busy = false;
-        bool after_world = rays.scene.world_visibility != 0u;
+        bool after_world = comes_after(rays);
         aside->stop(rays, aside->index, after_world);
         if constexpr (ANY) {
             rays.task.blocked[aside->index] = blocked;

@@ -32,12 +32,12 @@ class Build:
             self.arrays["flags"] = flags
         self.box: tuple[float, ...] = (0.0,) * 6  # of all usable triangles: lo, hi
         self.low: tuple[float, ...] = (0.0,) * 3
-        self.scale: tuple[float, ...] = (0.0,) * 3
+        self.scale = 0.0
 
     def run(self, kernel: str, count: int) -> None:
         """One thread for each of count."""
         pointers = [self.arrays[name].data.ptr if name in self.arrays else 0 for name in POINTERS]
-        task = struct.pack("<15Q6fI4x", *pointers, *self.low, *self.scale, count)
+        task = struct.pack("<15Q4fI4x", *pointers, *self.low, self.scale, count)
         load("CWBVH_BUILDER", "WATERTIGHT").kernel(kernel).launch(-(-count // BLOCK), BLOCK, [task])
 
     def counter(self, index: int) -> int:
@@ -104,8 +104,9 @@ def _sort(build: Build, triangles: int) -> int:
     build.run("make_boxes", count)
     low = cp.asnumpy(arrays["boxes"][:, :3].min(0))
     high = cp.asnumpy(arrays["boxes"][:, 3:].max(0))
-    extent = (high.astype(np.float64) - low).clip(1e-30)
-    build.low, build.scale = tuple(map(float, low)), tuple(map(float, np.minimum(2.0**21 / extent, 1e37)))
+    extent = float((high.astype(np.float64) - low).max())
+    # The curve's cells are cubes: with a scale for each axis a flat scene would be cut along the short one first.
+    build.low, build.scale = tuple(map(float, low)), float(min(2.0**21 / max(extent, 1e-30), 1e37))
     build.box = (*build.low, *map(float, high))
     build.run("make_keys", count)
     order = cp.argsort(arrays["keys"])

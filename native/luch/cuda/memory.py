@@ -20,8 +20,10 @@ COUNTERS = (
     "hits",
     "traced",
     "traced_after",
+    "near_movers",
     "shadowed",
     "shadowed_after",
+    "shadows_near_movers",
     "walks",
     "walked",
     "see_through",
@@ -46,6 +48,7 @@ class Memory:
         self._fields, self.beside = core.render.task_fields(), beside
         self.all_that_fits = False  # more paths were wanted than the device has room for
         self._film = cupy().empty(0, np.float64)
+        self.near_movers = cupy().empty(0, np.uint32)  # rays that what moves concerns (luch.cuda.trace)
         self._lay_out(task, pixels, paths)
         self.held = self.slots
         self._allocate(materials)
@@ -123,6 +126,7 @@ class Memory:
         if beside.walks:
             self.arrays["walks"] = empty(slots * sizes["walk"])
         if beside.moves:
+            self.near_movers = empty(slots * shadows, np.uint32)
             self.arrays |= {
                 "ray_time": empty(slots, np.float32),
                 "next_time": empty(slots, np.float32),
@@ -202,7 +206,8 @@ class Memory:
     @property
     def bytes(self) -> int:
         """All of it."""
-        return int(self._film.nbytes + self.counts.nbytes + sum(array.nbytes for array in self.arrays.values()))
+        arrays = [self._film, self.counts, self.near_movers, *self.arrays.values()]
+        return sum(int(array.nbytes) for array in arrays)
 
 
 def bytes_per_path(stride: int, beside: Beside) -> float:
@@ -212,6 +217,6 @@ def bytes_per_path(stride: int, beside: Beside) -> float:
     shadow = sizes["ray"] + sizes["shadow"] + 5 + media * sizes["media"] + 4 * transparent
     queues = 2 * (sizes["ray"] + 8) + sizes["hit"] + 4 + (2 + walks + media) * shadow
     rest = walks * sizes["walk"] + media * sizes["media"]
-    times = 4 * (4 + walks + media) * moves
+    times = 4 * (6 + 2 * (walks + media)) * moves
     ticks = 4 * (sizes["clocks"] + 3 + walks + media) * timed
     return float(sizes["path"] + queues + rest + times + ticks + 8 * stride + 4)

@@ -398,7 +398,8 @@ class DeviceRenderer(HostFilm):
         kinds = memory.address("next_kind" if turn else "ray_kind")
         with self._clock("closest"):
             self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"),
-                                 memory.counter("traced"), memory.address("next_time" if turn else "ray_time"),
+                                 memory.counter("traced"), memory.near_movers.data.ptr,
+                                 memory.address("next_time" if turn else "ray_time"),
                                  memory.address("ray_ticks"))  # fmt: skip
         shadows = 0
         if self._media:
@@ -437,13 +438,14 @@ class DeviceRenderer(HostFilm):
             with self._clock("any"):
                 self._tracer.any(memory.address("shadow_rays"), memory.address("shadow_kind"),
                                  memory.address("blocked"), memory.counter("shadows"), memory.counter("shadowed"),
-                                 memory.address("shadow_time"), memory.address("shadow_ticks"))  # fmt: skip
+                                 memory.near_movers.data.ptr, memory.address("shadow_time"),
+                                 memory.address("shadow_ticks"))  # fmt: skip
             with self._clock("shadows"):
                 self._launch(self._stages.kernel("add_shadows"), turn, shadows)
                 if self._transparent:
                     self._launch(self._stages.kernel("see_through"), turn, shadows, self._tracer.root)
             if not last:
-                memory.clear("shadows", "shadowed", "shadowed_after", "see_through")
+                memory.clear("shadows", "shadowed", "shadowed_after", "shadows_near_movers", "see_through")
         return shadows
 
     def _clock(self, stage: str) -> AbstractContextManager[None]:

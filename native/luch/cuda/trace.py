@@ -84,24 +84,23 @@ class SceneTracer:
         """One of the module's."""
         return self._module.kernel(name)
 
-    def closest(
-        self, rays: int, kinds: int, hits: int, count: int, following: int, times: int = 0, ticks: int = 0
-    ) -> None:
+    def closest(self, rays: int, kinds: int, hits: int, count: int, following: int, near: int, times: int = 0,
+                ticks: int = 0) -> None:  # fmt: skip
         """Puts it on the current stream. All are addresses on the device.
 
         rays: 32 bytes each (luch::Ray), 16 bytes aligned; kinds: uint32 each, or 0; hits: HIT each; count: uint32, how
-        many; following: two uint32, must be 0 when the kernels begin; times: float32 each, or 0; ticks: uint32 each, or 0.
+        many; following: three uint32, must be 0 when the kernels begin; near: room for a uint32 each, where those are
+        noted that may meet what moves, or 0 where nothing does; times: float32 each, or 0; ticks: uint32 each, or 0.
         """
-        self._launch(self._closest, rays, kinds, hits, 0, count, following, times, ticks)
+        self._launch(self._closest, rays, kinds, hits, 0, count, following, times, ticks, near)
 
-    def any(
-        self, rays: int, kinds: int, blocked: int, count: int, following: int, times: int = 0, ticks: int = 0
-    ) -> None:
+    def any(self, rays: int, kinds: int, blocked: int, count: int, following: int, near: int, times: int = 0,
+            ticks: int = 0) -> None:  # fmt: skip
         """As above. blocked: uint8 each, luch::Blocked."""
-        self._launch(self._any, rays, kinds, 0, blocked, count, following, times, ticks)
+        self._launch(self._any, rays, kinds, 0, blocked, count, following, times, ticks, near)
 
     def _launch(self, kernel: Kernel, *task: int) -> None:
-        arguments = [self._trees.root, struct.pack("<8Q", *task)]
+        arguments = [self._trees.root, struct.pack("<9Q", *task)]
         kernel.launch(kernel.resident_blocks(BLOCK), BLOCK, arguments)
         then = self._then.get(kernel.name)
         if then is not None:
@@ -131,12 +130,13 @@ class SceneTracer:
         kinds = None if kinds is None or not len(kinds) else cp.asarray(kinds)
         times = None if times is None else cp.asarray(times)
         results = cp.zeros(len(rays) * (1 if blocked else HIT.itemsize), np.uint8)
-        counts = cp.asarray(np.array([len(rays), 0, 0], np.uint32))
+        counts = cp.asarray(np.array([len(rays), 0, 0, 0], np.uint32))
+        near = cp.empty(len(rays), np.uint32)
 
         def run() -> None:
             counts[1:] = 0
             outputs = (0, results.data.ptr) if blocked else (results.data.ptr, 0)
             self._launch(kernel, rays.data.ptr, 0 if kinds is None else kinds.data.ptr, *outputs, counts.data.ptr,
-                         counts.data.ptr + 4, 0 if times is None else times.data.ptr, 0)  # fmt: skip
+                         counts.data.ptr + 4, 0 if times is None else times.data.ptr, 0, near.data.ptr)  # fmt: skip
 
         return results, run

@@ -13,8 +13,10 @@ enum WaveCounter : u32 {
     WAVE_HITS,         // rays that met a surface
     WAVE_TRACED,       // work counter of the closest kernel
     WAVE_TRACED_AFTER,  // and of the one for what moves, after it
+    WAVE_NEAR_MOVERS,   // rays that are left for it
     WAVE_SHADOWED,     // the same of the shadow kernels
     WAVE_SHADOWED_AFTER,
+    WAVE_SHADOWS_NEAR_MOVERS,
     WAVE_WALKS,        // under surfaces, of this round
     WAVE_WALKED,       // work counter of their kernel
     WAVE_SEE_THROUGH,  // shadow rays that met what may let light through
