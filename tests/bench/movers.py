@@ -59,11 +59,15 @@ def balls() -> Scene:
 
 
 def sunny(scene: Scene, clear: bool) -> Scene:
-    """Lit by a sun; the hidden ball is of a material of its own, which is clear or not."""
+    """Lit by a sun; the hidden ball is of a material and a mesh of its own, for which objects that share a mesh share
+    what shadow rays are told of it: clear or not.
+    """
     scene = replace(scene, lights=[Light("Sun", "SUN", power=np.pi)], world=None)
     kind = "CLOSURE_TRANSPARENT" if clear else "CLOSURE_DIFFUSE"
     hidden = Material("Hidden", program(lambda builder: closure(builder, kind, {"color": (0.8, 0.8, 0.8)})))
-    scene.materials, scene.objects = [*scene.materials, hidden], [*scene.objects, Object("Hidden", 0, [1])]
+    scene.materials = [*scene.materials, hidden]
+    scene.meshes = [*scene.meshes, replace(scene.meshes[0], name="Hidden")]
+    scene.objects = [*scene.objects, Object("Hidden", len(scene.meshes) - 1, [1])]
     scene.instances = replace(scene.instances, object=scene.instances.object.copy())
     scene.instances.object[SIDE[0] * SIDE[1]] = 2
     return scene

@@ -29,6 +29,12 @@
 #ifndef LUCH_ODD_ASIDES
 #define LUCH_ODD_ASIDES 1
 #endif
+#ifndef LUCH_MOST_A_FETCH
+#define LUCH_MOST_A_FETCH 64
+#endif
+#ifndef LUCH_FEWEST_A_FETCH
+#define LUCH_FEWEST_A_FETCH 8
+#endif
 #ifndef LUCH_TIMED_RAYS
 #define LUCH_TIMED_RAYS 0  // each ray's clock cycles are told, for the Render Time pass
 #endif
@@ -37,7 +43,8 @@ namespace luch {
 
 inline constexpr u32 ALL_LANES = 0xffffffffu;
 inline constexpr u32 SHARED_ENTRIES = LUCH_SHARED_ENTRIES;  // of a stack, in shared memory; the rest is local
-inline constexpr u32 RAYS_A_FETCH = 64;  // that a warp takes from the batch at once
+// That a warp takes from the batch at once: as many, or fewer where the batch would not feed all warps.
+inline constexpr u32 MOST_A_FETCH = LUCH_MOST_A_FETCH, FEWEST_A_FETCH = LUCH_FEWEST_A_FETCH;
 inline constexpr u32 SPARE_LANES = LUCH_SPARE_LANES;  // that may be idle at no account
 inline constexpr u32 LOST_LANE_STEPS = LUCH_LOST_STEPS;  // then idle lanes get new rays
 inline constexpr u32 LEAF_SHARE = LUCH_LEAF_SHARE;  // leaves wait until this part of the busy lanes is at one
@@ -63,18 +70,22 @@ struct SplitStack {
 
 // Rays that this warp has taken from the batch and not yet given to lanes: the same in all lanes.
 struct RayPool {
-    u32 first = 0, left = 0;
+    u32 first = 0, left = 0, at_once;
     bool exhausted = false;
+    __device__ __forceinline__ explicit RayPool(u32 count) {
+        u32 warps = gridDim.x * (blockDim.x / 32u), share = (count + warps - 1u) / warps;
+        at_once = share > MOST_A_FETCH ? MOST_A_FETCH : share < FEWEST_A_FETCH ? FEWEST_A_FETCH : share;
+    }
     // Each lane that asks gets a ray's index, or NONE.
     template <class Rays>
     __device__ __forceinline__ u32 give(const Rays& rays, bool asks) {
         u32 lane = threadIdx.x % 32u, asking = __ballot_sync(ALL_LANES, asks);
         if (left == 0 && !exhausted) {
             u32 taken = 0;
-            if (lane == 0) taken = atomicAdd(next_ray(rays), RAYS_A_FETCH);
+            if (lane == 0) taken = atomicAdd(next_ray(rays), at_once);
             first = __shfl_sync(ALL_LANES, taken, 0);
             u32 count = ray_count(rays);
-            left = first >= count ? 0u : count - first < RAYS_A_FETCH ? count - first : RAYS_A_FETCH;
+            left = first >= count ? 0u : count - first < at_once ? count - first : at_once;
             exhausted = left == 0;
         }
         u32 rank = u32(__popc(asking & ((1u << lane) - 1u))), index = NONE;
@@ -253,7 +264,7 @@ __device__ __forceinline__ void trace_persistent(const Rays& rays) {
     Walk walker;
     walker.aside = reinterpret_cast<Kept*>(asides + threadIdx.x * ASIDE_WORDS<Kept>);
     walker.busy = false;
-    RayPool pool;
+    RayPool pool(ray_count(rays));
     for (;;) {
         u32 index = pool.give(rays, !walker.busy);
         if (index != NONE) walker.begin(rays, index, &stack);
