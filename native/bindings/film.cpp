@@ -54,7 +54,7 @@ py::dict resolve_film(const cpu::Film& film) {
     py::dict passes;
     std::vector<float*> out;
     for (const cpu::Pass& pass : film.passes()) {
-        Floats pixels({py::ssize_t{film.height()}, py::ssize_t{film.width()}, py::ssize_t{pass.channels}});
+        Floats pixels({py::ssize_t{film.height()}, py::ssize_t{film.width()}, py::ssize_t{pass.from.channels}});
         out.push_back(pixels.mutable_data());
         passes[py::str(pass.name)] = pixels;
     }
@@ -131,7 +131,7 @@ void bind_film(py::module_& m) {
         .def("channel",
              [](const cpu::Film& self, const std::string& name) {
                  for (const cpu::Pass& pass : self.passes())
-                     if (pass.name == name) return pass.channel;
+                     if (pass.name == name) return pass.from.channel;
                  throw py::key_error(name);
              })
         .def("stride", [](cpu::Film& self) { return self.view().layout.stride; })

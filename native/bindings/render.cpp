@@ -102,6 +102,18 @@ class PyRenderer {
         return bindings::device_image(self.cast<PyRenderer&>().renderer_->device_image(), self);
     }
 
+    // [(name, channels, PassRead)]: what a device needs to read passes itself.
+    py::list pass_reads() const {
+        py::list reads;
+        for (const cpu::Pass& pass : renderer_->film().passes()) {
+            const PassRead read{pass.from, renderer_->film().exposure()};
+            char bytes[sizeof(PassRead)] = {};
+            std::memcpy(bytes, &read, sizeof(read));
+            reads.append(py::make_tuple(pass.name, pass.from.channels, py::bytes(bytes, sizeof(bytes))));
+        }
+        return reads;
+    }
+
     // The film's sums (pixels, channels) float64 and sample counts (pixels,) uint32, to be written by whoever renders
     // in this renderer's place.
     static py::tuple film_arrays(const py::object& self) {
@@ -320,6 +332,7 @@ void bind_render(py::module_& m) {
              "before the mark that parts them. Asks for Settings.estimate_error.")
         .def("device_images", [](const py::object& self) { return PyRenderer::device_images(self); })
         .def("device_view", [](const py::object& self) { return PyRenderer::device_view(self); })
+        .def("pass_reads", &PyRenderer::pass_reads)
         .def("film_arrays", [](const py::object& self) { return PyRenderer::film_arrays(self); })
         .def("device_facts", &PyRenderer::device_facts)
         .def("stats", &PyRenderer::stats, "Counts, bytes and seconds.");

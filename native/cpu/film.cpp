@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 
 namespace luch::cpu {
@@ -72,14 +70,14 @@ class LayoutBuilder {
         for (const KnownCrypto& crypto : known_cryptos) layout.*crypto.channel = NONE;
         layout.marks = layout.lightgroups = layout.aovs = NONE;
         layout.combined = take(4);
-        passes.push_back({"Combined", 4, PassKind::COMBINED, layout.combined});
+        passes.push_back({"Combined", {PassKind::COMBINED, 4, layout.combined}});
         if (spec.marks) layout.marks = take(MARKS * MARK_CHANNELS);
     }
 
     void add(const std::string& name) {
         if (exists(name) || is_named_elsewhere(name)) return;
         if (name == "Sample Count" || name == "Debug Sample Count") {
-            passes.push_back({name, 1, PassKind::SAMPLE_COUNT, NONE});
+            passes.push_back({name, {PassKind::SAMPLE_COUNT, 1, NONE}});
             return;
         }
         if (add_known(name) || add_crypto(name)) return;
@@ -93,7 +91,7 @@ class LayoutBuilder {
         layout.lightgroups = take(3 * layout.lightgroup_count);
         layout.any_light_pass = 1;
         for (u32 i = 0; i < layout.lightgroup_count; ++i)
-            add_named({"Combined_" + spec_.lightgroups[i], 3, PassKind::LIGHT, layout.lightgroups + 3 * i});
+            add_named({"Combined_" + spec_.lightgroups[i], {PassKind::LIGHT, 3, layout.lightgroups + 3 * i}});
     }
 
     void add_aovs() {
@@ -102,7 +100,7 @@ class LayoutBuilder {
         layout.aovs = take(4 * layout.aov_count);
         layout.any_data_pass = 1;
         for (u32 i = 0; i < layout.aov_count; ++i)
-            add_named({spec_.aovs[i].name, spec_.aovs[i].color ? 4u : 1u, PassKind::MEAN, layout.aovs + 4 * i});
+            add_named({spec_.aovs[i].name, {PassKind::MEAN, spec_.aovs[i].color ? 4u : 1u, layout.aovs + 4 * i}});
     }
 
     FilmLayout layout{};
@@ -136,7 +134,7 @@ class LayoutBuilder {
                 layout.any_data_pass = 1;
             }
             if (known.group != NEITHER) (known.group == LIGHT_PASS ? layout.any_light_pass : layout.any_data_pass) = 1;
-            passes.push_back({name, known.channels, known.kind, layout.*known.channel, divisor});
+            passes.push_back({name, {known.kind, known.channels, layout.*known.channel, divisor}});
             return true;
         }
         return false;
@@ -151,12 +149,12 @@ class LayoutBuilder {
                 name.find_first_not_of("0123456789", prefix.size()) != std::string::npos)
                 continue;
             if (layout.*crypto.channel != NONE) return true;
-            layout.crypto_slots = 2u * ((std::clamp(spec_.cryptomatte_depth, 1u, 16u) + 1u) / 2u);
+            layout.crypto_slots = 2u * ((std::clamp(spec_.cryptomatte_depth, 1u, MOST_CRYPTO_SLOTS) + 1u) / 2u);
             layout.*crypto.channel = take(2 * layout.crypto_slots);
             layout.any_data_pass = 1;
             for (u32 layer = 0; layer < layout.crypto_slots / 2; ++layer) {
                 const char number[] = {'0', static_cast<char>('0' + layer), '\0'};  // at most 8 layers
-                passes.push_back({prefix + number, 4, PassKind::CRYPTO, layout.*crypto.channel, NONE, layer});
+                passes.push_back({prefix + number, {PassKind::CRYPTO, 4, layout.*crypto.channel, NONE, layer}});
             }
             return true;
         }
@@ -174,86 +172,6 @@ class LayoutBuilder {
 
     const FilmSpec& spec_;
 };
-
-// A double as the nearest float, without turning a large finite sum into an infinity.
-float to_float(double x) {
-    constexpr double biggest = std::numeric_limits<float>::max();
-    return static_cast<float>(std::clamp(x, -biggest, biggest));
-}
-
-// Of the marks, the one that leaves the most even parts; of equal ones the later.
-const FilmSum* most_even_mark(const FilmSum* row, const FilmLayout& layout, u32 samples) {
-    const FilmSum* best = row + layout.marks;
-    for (u32 i = 1; i < MARKS; ++i) {
-        const FilmSum* mark = row + layout.marks + i * MARK_CHANNELS;
-        double gain = mark[3] * (samples - mark[3]) - best[3] * (samples - best[3]);
-        if (gain > 0.0 || (gain == 0.0 && mark[3] > best[3])) best = mark;
-    }
-    return best;
-}
-
-// Light over colour. Where the colour has no red (green, blue), the others speak for it.
-void divide_color(const FilmSum* light, const FilmSum* color, double scale, float* out) {
-    double sum = 0.0;
-    int defined = 0;
-    for (int k = 0; k < 3; ++k) {
-        if (color[k] == 0.0) continue;
-        sum += light[k] / color[k];
-        ++defined;
-    }
-    double others = defined ? sum / defined : 0.0;
-    for (int k = 0; k < 3; ++k) out[k] = to_float(scale * (color[k] != 0.0 ? light[k] / color[k] : others));
-}
-
-// The pixel's slots by falling weight (by id where equal), of which the layer holds two.
-void read_crypto(const FilmSum* slots, u32 slot_count, u32 layer, double scale, float* out) {
-    std::pair<double, double> by_weight[16];  // weight, id
-    for (u32 i = 0; i < slot_count; ++i) by_weight[i] = {-slots[2 * i + 1], slots[2 * i]};
-    std::sort(by_weight, by_weight + slot_count);
-    for (u32 i = 0; i < 2; ++i) {
-        out[2 * i] = static_cast<float>(by_weight[2 * layer + i].second);
-        out[2 * i + 1] = to_float(-by_weight[2 * layer + i].first * scale);
-    }
-}
-
-void read_pixel(const Pass& pass, const FilmSum* row, const FilmLayout& layout, u32 samples, double exposure,
-                float* out) {
-    double mean = 1.0 / samples;
-    const FilmSum* from = row + pass.channel;
-    switch (pass.kind) {
-        case PassKind::COMBINED:
-            for (int k = 0; k < 3; ++k) out[k] = to_float(from[k] * mean * exposure);
-            out[3] = to_float(std::clamp(1.0 - from[3] * mean, 0.0, 1.0));
-            break;
-        case PassKind::LIGHT:
-            for (u32 k = 0; k < pass.channels; ++k) out[k] = to_float(from[k] * mean * exposure);
-            break;
-        case PassKind::DIVIDED_LIGHT:
-            divide_color(from, row + pass.divisor, exposure, out);
-            break;
-        case PassKind::MEAN:
-            for (u32 k = 0; k < pass.channels; ++k) out[k] = to_float(from[k] * mean);
-            break;
-        case PassKind::FIRST:
-            for (u32 k = 0; k < pass.channels; ++k) out[k] = to_float(from[k]);
-            break;
-        case PassKind::DEPTH:
-            out[0] = from[0] == 0.0 ? 1e10f : to_float(from[0]);
-            break;
-        case PassKind::MIST:
-            out[0] = to_float(std::clamp(1.0 - from[0] * mean, 0.0, 1.0));
-            break;
-        case PassKind::TOTAL:
-            out[0] = to_float(from[0]);
-            break;
-        case PassKind::SAMPLE_COUNT:
-            out[0] = static_cast<float>(samples);
-            break;
-        case PassKind::CRYPTO:
-            read_crypto(from, layout.crypto_slots, pass.layer, mean, out);
-            break;
-    }
-}
 
 }  // namespace
 
@@ -288,7 +206,7 @@ void Film::resolve(const std::vector<float*>& out, ThreadPool& pool) const {
     // Pass after pass over a block of rows that stays in the second-level cache.
     pool.parallel_for(counts_.size(), 128, [&](size_t begin, size_t end, unsigned) {
         for (size_t i = 0; i < passes_.size(); ++i) {
-            const Pass& pass = passes_[i];
+            const PassSource& pass = passes_[i].from;
             float* to = out[i] + begin * pass.channels;
             for (size_t pixel = begin; pixel < end; ++pixel, to += pass.channels) {
                 if (counts_[pixel] == 0) {
@@ -307,19 +225,9 @@ double Film::deviations(float* mean, float* deviation, ThreadPool& pool) const {
     pool.parallel_for(counts_.size(), 1024, [&](size_t begin, size_t end, unsigned) {
         u64 own_before = 0, own_all = 0;
         for (size_t pixel = begin; pixel < end; ++pixel) {
-            const FilmSum* sum = rows_.get() + pixel * layout_.stride + layout_.combined;
-            const FilmSum* mark = most_even_mark(rows_.get() + pixel * layout_.stride, layout_, counts_[pixel]);
-            double n = counts_[pixel], a = mark[3], b = n - a;
-            bool both = a > 0.0 && b > 0.0;
-            own_before += both ? u64(a) : 0u, own_all += both ? counts_[pixel] : 0u;
-            double scale = n > 0.0 ? spec_.exposure / n : 0.0;
-            // With independent samples of variance v, means of a and of b samples differ by v / a + v / b = v n / (ab),
-            // and the mean of all errs by v / n.
-            double weight = both ? std::sqrt(a * b) * scale : std::numeric_limits<double>::quiet_NaN();
-            for (int k = 0; k < 3; ++k) {
-                mean[pixel * 3 + k] = to_float(sum[k] * scale);
-                deviation[pixel * 3 + k] = to_float((mark[k] / a - (sum[k] - mark[k]) / b) * weight);
-            }
+            MarkedSamples marked = read_deviation(rows_.get() + pixel * layout_.stride, layout_, counts_[pixel],
+                                                  spec_.exposure, mean + 3 * pixel, deviation + 3 * pixel);
+            own_before += marked.before, own_all += marked.all;
         }
         before += own_before, all += own_all;
     });

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cpu/thread_pool.h"
-#include "luch/film/film.h"
+#include "luch/film/read.h"
 
 namespace luch::cpu {
 
@@ -27,27 +27,9 @@ struct FilmSpec {
     bool marks = false;  // keep what the samples before powers of two added, for estimates of the error
 };
 
-// How a pass is read from its row.
-enum class PassKind : u8 {
-    COMBINED,      // mean; exposure on colour; alpha from transparency
-    LIGHT,         // mean, exposure
-    DIVIDED_LIGHT, // divided by the colour pass, exposure
-    MEAN,          // mean
-    FIRST,         // as it is
-    DEPTH,         // as it is, 0 becomes 1e10
-    MIST,          // 1 - mean
-    TOTAL,         // sum, as it is
-    SAMPLE_COUNT,
-    CRYPTO,        // ids as they are, mean weights, sorted by weight
-};
-
 struct Pass {
     std::string name;  // Blender's
-    u32 channels;      // of the result
-    PassKind kind;
-    u32 channel;       // in the row
-    u32 divisor = NONE;  // DIVIDED_LIGHT: channel of the colour pass
-    u32 layer = 0;       // CRYPTO: which pair of slots
+    PassSource from;
 };
 
 class Film {
@@ -59,10 +41,11 @@ class Film {
     const std::vector<Pass>& passes() const { return passes_; }  // Combined first
     u32 width() const { return spec_.width; }
     u32 height() const { return spec_.height; }
+    double exposure() const { return spec_.exposure; }
     // Bytes of one pixel: its row of sums and its sample count.
     u64 pixel_bytes() const { return u64(layout_.stride) * sizeof(FilmSum) + sizeof(u32); }
 
-    // Writes every pass: out[i] holds height * width * passes()[i].channels floats, bottom row first. Pixels
+    // Writes every pass: out[i] holds height * width * passes()[i].from.channels floats, bottom row first. Pixels
     // without samples are 0.
     void resolve(const std::vector<float*>& out, ThreadPool& pool) const;
 

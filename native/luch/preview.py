@@ -183,23 +183,23 @@ class Preview:
             rested = True
 
     def _draw(self, scene: Scene, tag: object, version: int) -> None:
-        """Each of the first pictures is half as coarse as the one before, until the finished size comes at once."""
+        """Each of the first pictures is half as coarse as the one before, until the finished size comes at once. Where
+        that is the first one, it is drawn all the same.
+        """
         factor = first = self._first_factor(scene.film)
         seen = False
         try:
-            if factor == 1 and self.kept.is_far(scene):  # a picture at once, and then a renderer of its own
-                self._draw_coarse(scene, 1, tag, version, True)
-            while factor > 1:
+            while True:
                 self._draw_coarse(scene, factor, tag, version, factor == first)
                 self._coarsest, seen = COARSEST, True
                 if version != self._version:
                     raise _Superseded
-                if self._pixel_seconds * scene.film.pixels <= AT_ONCE_SECONDS:
+                if factor <= 2 or self._pixel_seconds * scene.film.pixels <= AT_ONCE_SECONDS:
                     break
                 factor //= 2
         except _Superseded:
-            if first > 1 and not seen:  # views turn faster than pictures come
-                self._coarsest = min(2 * first, MOST_COARSE)
+            if not seen:  # views turn faster than pictures come
+                self._coarsest = max(2 * COARSEST, min(2 * first, MOST_COARSE))
             raise
         self._refine(scene, tag, version)
 
@@ -213,13 +213,17 @@ class Preview:
         return factor
 
     def _draw_coarse(self, scene: Scene, factor: int, tag: object, version: int, first: bool) -> None:
-        """One sample of every large pixel. The first picture is soon there, and drawn though the view turns on."""
+        """One sample of every large pixel. The first picture is soon there, and drawn though the view turns on: where
+        its pixels are those of the finished one, too, or a view that turns would show nothing on a fast device.
+        """
         film = coarser(scene.film, factor)
         settings = replace(
             scene.settings, samples=1, time_limit=0.0, error_limit=0.0, adaptive=False, estimate_error=False
         )
         result = self._render(replace(scene, film=film, settings=settings), version, None, first)
-        self._pixel_seconds = result.stats["trace_seconds"] / film.pixels
+        stats = result.stats  # whoever waits for a picture waits for its film and its reading, too
+        took = stats["total_seconds"] - (0.0 if stats["reused"] else stats["prepare_seconds"])
+        self._pixel_seconds = took / film.pixels
         nothing_yet = replace(preparing(scene.settings.samples, time.perf_counter()), preparing=False)
         self._say(version, self._describe(nothing_yet))  # instead of what was said of the view before
         self._show(Picture(result.passes["Combined"], film, version, tag))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from luch.preview import MOST_COARSE, Preview, coarser
-from luch.render import render
+from luch.render import Progress, Result, preparing, render
 from luch.same import same
 from luch.scene import Film, Scene
 from support.everything import everything
@@ -100,6 +101,38 @@ def test_a_view_that_turns_without_pause_shows_pictures_and_builds_once() -> Non
     assert preview.wait(0.5) and preview.picture is None  # nothing of before comes back
     assert len(seen) >= 5 and preview.kept.builds == 1, seen
     assert preview.kept.origin is None  # nor is it kept
+
+
+def test_a_view_that_turns_shows_pictures_where_the_finished_size_comes_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As on a GPU: 30 ms a picture, whatever its size, and a move every 10 ms."""
+    preview, scene = Preview(), scene_of(samples=1 << 16)
+
+    def slow(scene: Scene, progress: Callable[[Progress], bool], **_: object) -> Result:
+        began, samples = time.perf_counter(), 0
+        total = scene.settings.samples
+        while samples < total:
+            until = time.perf_counter() + 0.03
+            while time.perf_counter() < until:
+                progress(replace(preparing(total, began), samples=samples))
+                time.sleep(0.001)
+            samples += 1
+        pixels = np.zeros((scene.film.height, scene.film.width, 4), np.float32)
+        took = time.perf_counter() - began
+        return Result({"Combined": pixels}, {"total_seconds": took, "prepare_seconds": 0.0, "reused": True,
+                                             "trace_seconds": took})  # fmt: skip
+
+    monkeypatch.setattr("luch.preview.render", slow)
+    preview._pixel_seconds = 1e-6
+    seen = set()
+    for _ in range(60):
+        preview.submit(replace(scene))
+        time.sleep(0.01)
+        if preview.picture is not None:
+            seen.add((preview.picture.version, preview.picture.film.width))
+    preview.stop(wait=True)
+    assert len(seen) >= 6 and {width for _, width in seen} == {64}, seen
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from luch import accuracy, record
 from luch._native import core
+from luch.cuda.host import DEVICE_BUILDS_FROM
 from luch.cuda.programs import INSTRUCTION, Linked, operations, source
-from luch.cuda.render import DEVICE_BUILDS_FROM
 from luch.effects import effects_of
 from luch.report import tally
 from luch.scene import Scene

@@ -1,5 +1,7 @@
-// The stages that run no shader program: beginning paths, sorting hits by material, passing on to the next round.
+// The stages that run no shader program: beginning paths, sorting hits by material, passing on to the next round, reading
+// passes out of the film.
 #define LUCH_PLAN_CURVES 1  // which material a hit has
+#include "luch/film/read.h"
 #include "luch/integrator/camera_path.h"
 #include "luch/integrator/wavefront.h"
 #include "render/launch.cuh"
@@ -125,4 +127,29 @@ extern "C" __global__ void merge_layers(const __grid_constant__ luch::RenderTask
         FilmSum* row = film_row(from, pixel);
         for (u32 c = 0; c < task.film.layout.stride; ++c) row[c] = 0;
     }
+}
+
+// One pass of every pixel, 0 where it has no samples; after merge_layers.
+extern "C" __global__ void read_pass(const __grid_constant__ luch::RenderTask task, const luch::PassRead read,
+                                     float* out) {
+    using namespace luch;
+    u32 pixel = stage_index(), samples;
+    if (pixel >= task.wave.film_pixels) return;
+    float* to = out + u64(pixel) * read.from.channels;
+    if ((samples = task.film.sample_counts[pixel]) != 0)
+        return read_pixel(read.from, film_row(task.film, pixel), task.film.layout, samples, read.exposure, to);
+    for (u32 k = 0; k < read.from.channels; ++k) to[k] = 0.0f;
+}
+
+// Means, then deviations, three floats a pixel each; of every pixel the samples before its mark, then those in all.
+extern "C" __global__ void read_deviations(const __grid_constant__ luch::RenderTask task, const luch::PassRead read,
+                                           float* out, u32* marked) {
+    using namespace luch;
+    u32 pixel = stage_index(), pixels = task.wave.film_pixels;
+    if (pixel >= pixels) return;
+    float* mean = out + 3 * u64(pixel);
+    MarkedSamples own = read_deviation(film_row(task.film, pixel), task.film.layout, task.film.sample_counts[pixel],
+                                       read.exposure, mean, mean + 3 * u64(pixels));
+    marked[pixel] = own.before;
+    marked[pixels + pixel] = own.all;
 }

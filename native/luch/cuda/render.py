@@ -10,9 +10,8 @@ from __future__ import annotations
 import struct
 import threading
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -21,12 +20,13 @@ from luch._native import core
 from luch.adaptive import parts, regions_of
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
-from luch.cuda.memory import RAY_CAMERA, Beside, Memory, bytes_per_path
+from luch.cuda.host import HostFilm, HostScene
+from luch.cuda.memory import NONE, RAY_CAMERA, Beside, Memory, bytes_per_path
 from luch.cuda.plan import sampler_flags
 from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.timing import TIMED, StageClocks
 from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
-from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, Links, images_to_leave, tiled, too_large
+from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, Links, images_to_leave, too_large
 from luch.ledger import REFUSALS
 
 BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
@@ -36,8 +36,6 @@ BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
 PATHS_OF_MULTIPROCESSOR = 1 << 16
 MOST_PATHS = 1 << 24
 FEWEST_PATHS = 1 << 14
-# Groups of so many triangles get their tree from the GPU: a million take 10 ms there and 1.7 s on a processor.
-DEVICE_BUILDS_FROM = 20_000
 # Part of the free memory that a wavefront and its film may take.
 MEMORY_SHARE = 0.85
 # Part of the free memory that a scene may take; film and paths want some, too.
@@ -74,77 +72,6 @@ def _told_images(sizes: list[int]) -> list[str]:
     ]
 
 
-class HostScene:
-    """What the core makes of a scene for devices: read and built once, however many devices render it."""
-
-    def __init__(self, scene: Any) -> None:
-        self._scene = scene
-        self.core = core.render.Renderer(scene, True, DEVICE_BUILDS_FROM)
-        self.facts: dict[str, Any] = {}
-        self.images: Any = None  # core.render.Renderer.device_images
-
-    def prepare(self) -> bool:
-        """Builds structures and lights. False when cancelled."""
-        if not self.core.prepare():
-            return False
-        self.facts = self.core.device_facts()
-        (blocks, links), trees, left, depth = self.core.device_images()
-        self.images = (tiled(blocks, links), links), trees, left, depth
-        return True
-
-    def set_view(self, scene: Any) -> tuple[dict[str, Any], Blocks, Links] | None:
-        """The same scene looked at anew: its facts, blocks and links. None: devices need more than those of the view."""
-        if self.facts["world_reads_camera"]:
-            return None
-        self.core.set_view(scene)
-        before, self.facts = self.facts, self.core.device_facts()
-        if {**before, "most_rounds": 0} != {**self.facts, "most_rounds": 0}:
-            return None
-        blocks, links = self.core.device_view()
-        self._scene = scene
-        return self.facts, blocks, links
-
-    def build_all(self) -> bool:
-        """The same, with nothing left for devices to build. False when cancelled."""
-        self.core = core.render.Renderer(self._scene, True)
-        return self.prepare()
-
-    def set_film(self, rows: Any, counts: Any) -> None:
-        """rows: (pixels, stride) float64; counts: (pixels,) uint32, samples of each."""
-        own_rows, own_counts = self.core.film_arrays()
-        own_rows[...] = rows
-        own_counts[...] = counts
-
-
-class HostFilm(ABC):
-    """What is read from the film on the host: of any renderer whose film lies on devices."""
-
-    def __init__(self, host: HostScene) -> None:
-        self._host = host
-
-    @abstractmethod
-    def _download(self) -> None:
-        """Brings the film's sums to the host, if they are not there."""
-
-    def passes(self) -> dict[str, Any]:
-        """Blender's pass name -> float32 (H, W, C), bottom row first."""
-        self._download()
-        passes: dict[str, Any] = self._host.core.passes()
-        return passes
-
-    def film_arrays(self) -> tuple[Any, Any]:
-        """As core.render.Renderer's."""
-        self._download()
-        rows, counts = self._host.core.film_arrays()
-        return rows, counts
-
-    def deviations(self) -> tuple[Any, Any, float]:
-        """As core.render.Renderer's."""
-        self._download()
-        mean, deviation, share = self._host.core.deviations()
-        return mean, deviation, share
-
-
 class DeviceRenderer(HostFilm):
     """One scene on the current CUDA device. Raises DeviceError where there is none, or its memory is too small."""
 
@@ -170,7 +97,7 @@ class DeviceRenderer(HostFilm):
         self._counts = {"paths": 0, "rays": 0, "shadow_rays": 0}
         self._trace_seconds = self._upload_seconds = 0.0
         self._uncharged = 0.0  # since when no time was shared among pixels, by the clock of perf_counter
-        self._merged = True
+        self._merged = self._on_host = True  # the film's layers in one, and that one
 
     @property
     def device(self) -> str:
@@ -367,7 +294,7 @@ class DeviceRenderer(HostFilm):
 
     def _trace_wave(self, pixel: int, pixels: int, sample: int, samples: int, listed: Any) -> None:
         memory, rays = self._memory, pixels * samples
-        self._merged = False
+        self._merged = self._on_host = False
         self._counts["paths"] += rays
         self._launch(
             self._paths.kernel("begin_paths"),
@@ -470,17 +397,54 @@ class DeviceRenderer(HostFilm):
 
     def film(self) -> tuple[Any, Any]:
         """The film's sums (pixels, stride) float64 and samples (pixels,) uint32 so far, on the host."""
+        with self._whole_film() as memory:
+            return memory.rows[0].get(), memory.counts[0].get()
+
+    @contextmanager
+    def _whole_film(self) -> Iterator[Memory]:
+        """With all layers of the film in the first."""
         memory = self._memory
         with self._lock, self._device:
             enter_context()
             if not self._merged:
                 self._launch(self._paths.kernel("merge_layers"), 0, memory.pixels, struct.pack("<I", memory.layers))
                 self._merged = True
-            return memory.rows[0].get(), memory.counts[0].get()
+            yield memory
 
     def _download(self) -> None:
-        if not self._merged:
+        if not self._on_host:
             self._host.set_film(*self.film())
+            self._on_host = True
+
+    def passes(self) -> dict[str, Any]:
+        """As core.render.Renderer's, read on the device: a few floats a pixel are on their way, not all its sums."""
+        if self._held is None:  # nothing was traced
+            return super().passes()
+        with self._whole_film() as memory:
+            return {
+                name: self._read(memory, "read_pass", channels, read)
+                for name, channels, read in self._host.core.pass_reads()
+            }
+
+    def deviations(self) -> tuple[Any, Any, float]:
+        """As core.render.Renderer's."""
+        if self._held is None or self._memory.field("film.layout.marks") == NONE:
+            return super().deviations()  # which says what is wrong
+        with self._whole_film() as memory:
+            marked = cupy().empty((2, memory.pixels), np.uint32)
+            _, _, read = self._host.core.pass_reads()[0]
+            both = self._read(memory, "read_deviations", 6, read, struct.pack("<Q", marked.data.ptr))
+            before, samples = (int(part) for part in marked.sum(axis=1, dtype=np.uint64).get())
+        mean, deviation = both.reshape(2, *both.shape[:2], 3)
+        return mean, deviation, before / samples if samples else 0.0
+
+    def _read(self, memory: Memory, kernel: str, channels: int, *arguments: bytes) -> Any:
+        """float32 (H, W, channels), bottom row first."""
+        out = cupy().empty(memory.pixels * channels, np.float32)
+        first, *more = arguments
+        self._launch(self._paths.kernel(kernel), 0, memory.pixels, first, struct.pack("<Q", out.data.ptr), *more)
+        width, height = self._scene.film.size
+        return out.get().reshape(height, width, channels)
 
     def stats(self) -> dict[str, Any]:
         """Counts, bytes and seconds, under the names of the CPU's."""

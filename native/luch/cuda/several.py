@@ -15,7 +15,8 @@ from typing import Any
 
 from luch.adaptive import parts, regions_of
 from luch.cuda.device import OLDEST, DeviceError, architecture_of, cupy, require_sound
-from luch.cuda.render import DeviceRenderer, HostFilm, HostScene, parted
+from luch.cuda.host import HostFilm, HostScene
+from luch.cuda.render import DeviceRenderer, parted
 from luch.cuda.trace import TreesTooDeep
 from luch.ledger import REFUSALS
 
