@@ -10,6 +10,12 @@
 #ifndef LUCH_PLAN_HAIR
 #define LUCH_PLAN_HAIR 1
 #endif
+#ifndef LUCH_PLAN_FIBRES
+#define LUCH_PLAN_FIBRES 1
+#endif
+#ifndef LUCH_PLAN_HAIR_CONES
+#define LUCH_PLAN_HAIR_CONES 1
+#endif
 #ifndef LUCH_PLAN_THIN_FILM
 #define LUCH_PLAN_THIN_FILM 1
 #endif
@@ -132,7 +138,9 @@
 namespace luch::plan {
 
 inline constexpr bool CURVES = LUCH_PLAN_CURVES;  // primitives that are pieces of hair
-inline constexpr bool HAIR = LUCH_PLAN_HAIR;  // lobes of hair
+inline constexpr bool FIBRES = LUCH_PLAN_HAIR && LUCH_PLAN_FIBRES;          // lobes of Principled Hair
+inline constexpr bool HAIR_CONES = LUCH_PLAN_HAIR && LUCH_PLAN_HAIR_CONES;  // lobes of the Hair BSDF node
+inline constexpr bool HAIR = FIBRES || HAIR_CONES;
 inline constexpr bool THIN_FILM = LUCH_PLAN_THIN_FILM;
 inline constexpr bool SHEEN = LUCH_PLAN_SHEEN;  // Sheen and velvet lobes
 inline constexpr bool TOON = LUCH_PLAN_TOON;

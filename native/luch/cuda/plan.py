@@ -51,6 +51,8 @@ TOLD = {
 }
 # Define -> operations of shader programs that make such lobes.
 MADE_BY: dict[str, tuple[str, ...]] = {
+    "FIBRES": ("CLOSURE_PRINCIPLED_HAIR",),
+    "HAIR_CONES": ("CLOSURE_HAIR",),
     "TOON": ("CLOSURE_TOON",),
     "SUBSURFACE": ("CLOSURE_SUBSURFACE", "CLOSURE_PRINCIPLED_SUBSURFACE"),
     "MICROFACETS": (
