@@ -82,6 +82,9 @@
 #ifndef LUCH_PLAN_SUBSURFACE
 #define LUCH_PLAN_SUBSURFACE 1
 #endif
+#ifndef LUCH_PLAN_BENT_EXITS
+#define LUCH_PLAN_BENT_EXITS 1
+#endif
 #ifndef LUCH_PLAN_VOLUMES
 #define LUCH_PLAN_VOLUMES 1
 #endif
@@ -165,6 +168,7 @@ inline constexpr bool FILTER_GLOSSY = LUCH_PLAN_FILTER_GLOSSY;
 inline constexpr bool HOLDOUT = LUCH_PLAN_HOLDOUT;
 inline constexpr bool CLAMPING = LUCH_PLAN_CLAMPING;
 inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin walls
+inline constexpr bool BENT_EXITS = LUCH_PLAN_BENT_EXITS;  // of walks under surfaces whose program bends the normal
 inline constexpr bool VOLUMES = LUCH_PLAN_VOLUMES;
 inline constexpr bool MOTION = LUCH_PLAN_MOTION;  // of the camera, of objects, of their shapes
 inline constexpr bool TIME = LUCH_PLAN_TIME;      // the Render Time pass

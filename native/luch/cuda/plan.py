@@ -79,6 +79,7 @@ POSSIBLE = {
     "CUBIC_IMAGES": "cubic images",
     "HALF_IMAGES": "half images",
     "FLOAT_IMAGES": "float images",
+    "BENT_EXITS": "bent exits",
 }
 MOST_LOBES = 12  # of plan.h, where general code keeps the likeliest
 SAMPLER = "SAMPLER"  # define -> SamplerFamily
