@@ -17,7 +17,7 @@ from luch.scene import Scene
 from support.frames import resident_mib
 
 ASKED = ("RENDER_STAGES", "WATERTIGHT", 90, "programs", ("-DA=1",))
-FACTS = {"programs": [], "structure": "CWBVH", "registers": 8, "transparent": False}
+FACTS = {"programs": [], "materials": 0, "structure": "CWBVH", "registers": 8, "transparent": False}
 BLOCKS = [("instructions", np.zeros(0, np.uint8)), ("operands", np.zeros(0, np.uint8))]
 
 

@@ -72,6 +72,16 @@ def test_principled_needs_what_its_inputs_ask_for(inputs: dict[str, object], nee
     assert possible_in(scene(lambda builder: principled(builder, **inputs))).needs == needs
 
 
+def test_exits_of_walks_ask_a_program_where_it_may_bend_the_normal() -> None:
+    skin: dict[str, object] = {"color": ONE, "radius": ONE, "ior": 1.4, "alpha": 0.2}
+    plain, bent, thin = (
+        scene(lambda builder, inputs=inputs: closure(builder, "CLOSURE_SUBSURFACE", inputs))
+        for inputs in (skin, {**skin, "normal": (0.1, 0.0, 1.0)}, {**skin, "radius": 0.0, "normal": (0.1, 0.0, 1.0)})
+    )
+    assert "bent exits" in possible_in(bent).needs
+    assert "bent exits" not in possible_in(plain).needs | possible_in(thin).needs
+
+
 def test_distributions_and_images_are_needed_where_they_are_chosen() -> None:
     beckmann = scene(lambda builder: closure(builder, "CLOSURE_GLOSSY", {"color": ONE}, params=(1, 1)))
     assert possible_in(beckmann).needs == {"beckmann"}

@@ -8,6 +8,7 @@ test_effect_pairs.py.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -136,8 +137,27 @@ def code_of(scene: Scene) -> tuple[str, Any]:
     instructions = np.frombuffer(arrays["instructions"], INSTRUCTION)
     effects = effects_of(scene)
     told = [(name, effects[name].on) for name in effects]
-    text = source(programs, instructions, np.frombuffer(arrays["operands"], np.uint32))
+    text = source(programs, facts["materials"], instructions, np.frombuffer(arrays["operands"], np.uint32))
     return text, (told, operations(programs, instructions), {k: v for k, v in facts.items() if k != "programs"})
+
+
+def test_each_kernel_function_holds_the_programs_that_it_may_be_asked_for_and_no_others() -> None:
+    """Surfaces are shaded by all of their programs; of the world and of lamps nobody asks more than light."""
+    renderer = core.render.Renderer(everything(), True, DEVICE_BUILDS_FROM)
+    assert renderer.prepare()
+    facts, text = renderer.device_facts(), code_of(everything())[0]
+    programs, materials = [Linked(*row) for row in facts["programs"]], facts["materials"]
+    assert 0 < materials < len(programs)
+
+    def called(name: str) -> set[int]:
+        function = text[text.index(f" {name}(") :]
+        return {int(first) for first in re.findall(r"case (\d+)u:", function[: function.index("\n}")])}
+
+    surfaces, lights = programs[:materials], programs[materials:]
+    assert called("run_program") == {p.first_instruction for p in surfaces if p.instruction_count}
+    assert called("run_surface_light") == {p.first_instruction for p in surfaces if p.light_instruction_count}
+    assert called("run_light_program") == {p.first_instruction for p in lights if p.light_instruction_count}
+    assert called("run_light_program"), "the scene has a world or a lamp of nodes"
 
 
 def test_what_changes_from_frame_to_frame_is_no_part_of_the_kernels() -> None:

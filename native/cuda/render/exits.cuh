@@ -20,7 +20,7 @@ __device__ __forceinline__ void shade_exit(const RenderTask& task, const Subsurf
     SurfacePoint spawn = exit_point(scene, walk, time);
     setup_surface_lane(scene.view, exit_inputs(path, slot, walk, spawn, time), points, 0);
     Vec3 normal = lane_normal(points, 0);
-    if (program.flags & PROGRAM_SUBSURFACE_BUMP) {
+    if (plan::BENT_EXITS && (program.flags & PROGRAM_SUBSURFACE_BUMP)) {
         run_program(context_of(scene.view, program, points, set, nullptr));
         normal = exit_normal(set, normal);
     }

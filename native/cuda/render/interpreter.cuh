@@ -39,9 +39,10 @@ __device__ __noinline__ void run_instructions(const OpContext& c, u32 count) {
 
 __device__ __forceinline__ void run_program(const OpContext& c) { run_instructions(c, c.program->instruction_count); }
 
-// Emission, transparency and holdout alone.
 __device__ __forceinline__ void run_light_program(const OpContext& c) {
     run_instructions(c, c.program->light_instruction_count);
 }
+
+__device__ __forceinline__ void run_surface_light(const OpContext& c) { run_light_program(c); }
 
 }  // namespace luch

@@ -27,8 +27,7 @@ LUCH_STAGE(find_light) {
         if (plan::WORLD_PROGRAM && !task.scene.world_emission.constant) {
             points.count = 1;
             setup_world_lane(path, ray.direction, points, 0);
-            run_program(context_of(task.scene.view, task.scene.view.world_program, points, set, nullptr));
-            radiance = set.emission;
+            radiance = shader.light(task.scene.view.world_program, points).emission;
             add_total(wave, TOTAL_WORLD_POINTS, 1);
         }
         add_world(task.scene, writer, path, ray.direction, radiance);

@@ -1,5 +1,7 @@
 // Shader programs on the device. A scene's own build includes straight-line code that luch/cuda/programs.py wrote;
-// without it programs are interpreted, operation by operation, by the same functions.
+// without it programs are interpreted, operation by operation, by the same functions. run_program: all of a material's;
+// run_surface_light: emission, transparency and holdout alone; run_light_program: the same of the world, of lamps and of
+// surfaces whose emission is not the same everywhere. Kernels hold no code of programs that they never run.
 #pragma once
 #include "luch/bsdf/bsdf.h"
 #include "luch/shade/ops.h"

@@ -55,7 +55,7 @@ extern "C" __global__ void __launch_bounds__(luch::STAGE_BLOCK, LUCH_STAGE_BLOCK
     StageTimer timer(wave, CLOCK_SHADOWS, shadow.path);
     ShadePoints points;
     ClosureSet set;
-    PointShader shader{task.scene.view, set};
+    SurfaceShader shader{task.scene.view, set};
     OneRay tracer{trees, plan::MOTION && wave.shadow_time ? wave.shadow_time[k] : SHUTTER_MIDDLE};
     u64 steps = 0, rays = 0;
     MediumStack* stack = plan::VOLUMES && wave.media ? wave.shadow_media + k : nullptr;

@@ -46,13 +46,25 @@ __device__ __forceinline__ OpContext context_of(const SceneView& scene, const Pr
     return {&scene, &program, &points, 0, &set, aovs};
 }
 
-// What luch/integrator's functions ask for: the light of a program at a point.
+// What luch/integrator's functions ask for: the light of a program at a point, of the world, a lamp or a light that was
+// chosen.
 struct PointShader {
     const SceneView& scene;
     ClosureSet& set;
 
     __device__ __forceinline__ const ClosureSet& light(const Program& program, const ShadePoints& points) {
         run_light_program(context_of(scene, program, points, set, nullptr));
+        return set;
+    }
+};
+
+// The same of any surface.
+struct SurfaceShader {
+    const SceneView& scene;
+    ClosureSet& set;
+
+    __device__ __forceinline__ const ClosureSet& light(const Program& program, const ShadePoints& points) {
+        run_surface_light(context_of(scene, program, points, set, nullptr));
         return set;
     }
 };

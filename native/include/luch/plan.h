@@ -10,6 +10,12 @@
 #ifndef LUCH_PLAN_HAIR
 #define LUCH_PLAN_HAIR 1
 #endif
+#ifndef LUCH_PLAN_FIBRES
+#define LUCH_PLAN_FIBRES 1
+#endif
+#ifndef LUCH_PLAN_HAIR_CONES
+#define LUCH_PLAN_HAIR_CONES 1
+#endif
 #ifndef LUCH_PLAN_THIN_FILM
 #define LUCH_PLAN_THIN_FILM 1
 #endif
@@ -76,6 +82,9 @@
 #ifndef LUCH_PLAN_SUBSURFACE
 #define LUCH_PLAN_SUBSURFACE 1
 #endif
+#ifndef LUCH_PLAN_BENT_EXITS
+#define LUCH_PLAN_BENT_EXITS 1
+#endif
 #ifndef LUCH_PLAN_VOLUMES
 #define LUCH_PLAN_VOLUMES 1
 #endif
@@ -132,7 +141,9 @@
 namespace luch::plan {
 
 inline constexpr bool CURVES = LUCH_PLAN_CURVES;  // primitives that are pieces of hair
-inline constexpr bool HAIR = LUCH_PLAN_HAIR;  // lobes of hair
+inline constexpr bool FIBRES = LUCH_PLAN_HAIR && LUCH_PLAN_FIBRES;          // lobes of Principled Hair
+inline constexpr bool HAIR_CONES = LUCH_PLAN_HAIR && LUCH_PLAN_HAIR_CONES;  // lobes of the Hair BSDF node
+inline constexpr bool HAIR = FIBRES || HAIR_CONES;
 inline constexpr bool THIN_FILM = LUCH_PLAN_THIN_FILM;
 inline constexpr bool SHEEN = LUCH_PLAN_SHEEN;  // Sheen and velvet lobes
 inline constexpr bool TOON = LUCH_PLAN_TOON;
@@ -157,6 +168,7 @@ inline constexpr bool FILTER_GLOSSY = LUCH_PLAN_FILTER_GLOSSY;
 inline constexpr bool HOLDOUT = LUCH_PLAN_HOLDOUT;
 inline constexpr bool CLAMPING = LUCH_PLAN_CLAMPING;
 inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin walls
+inline constexpr bool BENT_EXITS = LUCH_PLAN_BENT_EXITS;  // of walks under surfaces whose program bends the normal
 inline constexpr bool VOLUMES = LUCH_PLAN_VOLUMES;
 inline constexpr bool MOTION = LUCH_PLAN_MOTION;  // of the camera, of objects, of their shapes
 inline constexpr bool TIME = LUCH_PLAN_TIME;      // the Render Time pass

@@ -51,6 +51,8 @@ TOLD = {
 }
 # Define -> operations of shader programs that make such lobes.
 MADE_BY: dict[str, tuple[str, ...]] = {
+    "FIBRES": ("CLOSURE_PRINCIPLED_HAIR",),
+    "HAIR_CONES": ("CLOSURE_HAIR",),
     "TOON": ("CLOSURE_TOON",),
     "SUBSURFACE": ("CLOSURE_SUBSURFACE", "CLOSURE_PRINCIPLED_SUBSURFACE"),
     "MICROFACETS": (
@@ -77,6 +79,7 @@ POSSIBLE = {
     "CUBIC_IMAGES": "cubic images",
     "HALF_IMAGES": "half images",
     "FLOAT_IMAGES": "float images",
+    "BENT_EXITS": "bent exits",
 }
 MOST_LOBES = 12  # of plan.h, where general code keeps the likeliest
 SAMPLER = "SAMPLER"  # define -> SamplerFamily

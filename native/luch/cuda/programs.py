@@ -88,30 +88,42 @@ def operations(programs: list[Linked], instructions: Any) -> set[str]:
     return {BY_CODE[code].name for code in codes}
 
 
-def source(programs: list[Linked], instructions: Any, operands: Any) -> str:
-    """luch_scene_programs.cuh: run_program and run_light_program over exactly these programs.
+def source(programs: list[Linked], materials: int, instructions: Any, operands: Any) -> str:
+    """luch_scene_programs.cuh: functions that run exactly these programs, each with no more than may be asked of it.
 
+    programs: those of materials, so many, before those of the world and of lamps, of which nobody asks more than light.
     instructions: INSTRUCTION (I,); operands: uint32 (O,): SceneView's arrays.
     """
     bodies: dict[str, int] = {}
-    cases: dict[str, dict[int, int]] = {"run_program": {}, "run_light_program": {}}
-    for program in programs:
-        for name, count in (
-            ("run_program", program.instruction_count),
-            ("run_light_program", program.light_instruction_count),
-        ):
-            if count:
+
+    def cases(some: list[Linked], counted: str) -> list[str]:
+        called: dict[int, int] = {}
+        for program in some:
+            if count := getattr(program, counted):
                 body = _body(program, count, instructions, operands)
-                cases[name][program.first_instruction] = bodies.setdefault(body, len(bodies))
+                called[program.first_instruction] = bodies.setdefault(body, len(bodies))
+        return [f"        case {first}u: straight_{number}(c); break;" for first, number in called.items()]
+
+    surfaces, lights = programs[:materials], programs[materials:]
+    functions = [
+        *_runner("run_program", "instruction_count", cases(surfaces, "instruction_count"), "break"),
+        *_runner("run_surface_light", "light_instruction_count", cases(surfaces, "light_instruction_count"), "break"),
+        *_runner("run_light_program", "light_instruction_count", cases(lights, "light_instruction_count"),
+                 "if constexpr (plan::EMISSION_PROGRAMS) run_surface_light(c)"),
+    ]  # fmt: skip
     parts = ["#pragma once", '#include "render/programs.cuh"', "namespace luch {"]
     for body, number in bodies.items():
         parts.append(f"__device__ __noinline__ void straight_{number}(const OpContext& c) {{\n{body}\n}}")
-    for name, chosen in cases.items():
-        counted = "instruction_count" if name == "run_program" else "light_instruction_count"
-        parts.append(f"__device__ __forceinline__ void {name}(const OpContext& c) {{")
-        parts.append(f"    if (c.program->{counted} == 0u) return;")
-        parts.append("    switch (c.program->first_instruction) {")
-        parts += [f"        case {first}u: straight_{number}(c); break;" for first, number in chosen.items()]
-        parts.append("        default: break;\n    }\n}")
-    parts.append("}  // namespace luch")
-    return "\n".join(parts) + "\n"
+    return "\n".join([*parts, *functions, "}  // namespace luch"]) + "\n"
+
+
+def _runner(name: str, counted: str, cases: list[str], otherwise: str) -> list[str]:
+    return [
+        f"__device__ __forceinline__ void {name}(const OpContext& c) {{",
+        f"    if (c.program->{counted} == 0u) return;",
+        "    switch (c.program->first_instruction) {",
+        *cases,
+        f"        default: {otherwise};",
+        "    }",
+        "}",
+    ]

@@ -34,7 +34,8 @@ class SceneKernels:
         arrays = dict(blocks)
         programs = [Linked(*row) for row in facts["programs"]]
         instructions = np.frombuffer(arrays["instructions"], INSTRUCTION)
-        self._text = source(programs, instructions, np.frombuffer(arrays["operands"], np.uint32))
+        operands = np.frombuffer(arrays["operands"], np.uint32)
+        self._text = source(programs, facts["materials"], instructions, operands)
         self._flags = [
             "-DLUCH_SCENE_PROGRAMS",
             f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",

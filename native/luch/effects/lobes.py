@@ -15,7 +15,7 @@ from luch.bounds import FILM_MIN_THICKNESS_NM
 from luch.effects.closures import Closure
 from luch.effects.programs import decode
 from luch.scene import Program, Scene
-from luch.shader_code import PRINCIPLED
+from luch.shader_code import PRINCIPLED, SUBSURFACE_BUMP
 
 # Microfacets and Interpolation: the menus of bsdf/params.h and shade/textures/image.h.
 _BECKMANN, _ASHIKHMIN_SHIRLEY, _CUBIC = 1, 3, 2
@@ -45,6 +45,8 @@ def possible_in(scene: Scene) -> Possible:
     needs = {_PIXELS[image.pixels.dtype] for image in scene.images if image.pixels.dtype in _PIXELS}
     most = 1
     for program in programs_of(scene):
+        if program.flags & SUBSURFACE_BUMP:
+            needs.add("bent exits")
         nodes, constants = decode(program)
         closures = [Closure(node, constants) for node in nodes if node.op.closure]
         needs.update(name for closure in closures for name in _of_closure(closure))

@@ -18,6 +18,8 @@ LUCH_FN Vec3 mirrored_at(Vec3 w, Vec3 n) { return w - n * (2.0f * dot(w, n)); }
 LUCH_FN bool is_diffuse(LobeType t) { return t <= LobeType::SHEEN; }
 LUCH_FN bool is_subsurface(LobeType t) { return t >= LobeType::SUBSURFACE && t <= LobeType::SUBSURFACE_DISK; }
 LUCH_FN bool is_hair(LobeType t) { return plan::HAIR && t >= LobeType::HAIR_FIBRE && t <= LobeType::HAIR_TRANSMISSION; }
+// Of the lobes of hair.
+LUCH_FN bool is_fibre(LobeType t) { return plan::FIBRES && (!plan::HAIR_CONES || t == LobeType::HAIR_FIBRE); }
 
 // A lobe's light counts by its kind and, for glass, by the side it leaves on.
 LUCH_FN LobeClass lobe_class(const Lobe& lobe, Vec3 wi) {
@@ -75,11 +77,11 @@ LUCH_FN LobeValue eval_lobe_unshadowed(const Lobe& lobe, Vec3 wo, Vec3 wi) {
             if constexpr (plan::MICROFACETS) return eval_microfacet(lobe, wo, wi);
             break;
         case LobeType::HAIR_FIBRE:
-            if constexpr (plan::HAIR) return eval_fibre(lobe, wo, wi);
+            if constexpr (plan::FIBRES) return eval_fibre(lobe, wo, wi);
             break;
         case LobeType::HAIR_REFLECTION:
         case LobeType::HAIR_TRANSMISSION:
-            if constexpr (plan::HAIR) return eval_hair(lobe, wo, wi);
+            if constexpr (plan::HAIR_CONES) return eval_hair(lobe, wo, wi);
             break;
         case LobeType::SUBSURFACE:
         case LobeType::SUBSURFACE_SKIN:
@@ -152,8 +154,7 @@ LUCH_FN LobeSample sample_lobe(const Lobe& lobe, Vec3 n_geometric, Vec3 wo, floa
     if (plan::ASHIKHMIN_SHIRLEY && lobe.type == LobeType::ASHIKHMIN_SHIRLEY) {
         s = sample_ashikhmin_shirley(lobe, outside, seen_from, u);
     } else if (is_hair(lobe.type)) {
-        s = lobe.type == LobeType::HAIR_FIBRE ? sample_fibre(lobe, seen_from, u_side, u)
-                                              : sample_hair(lobe, seen_from, u);
+        s = is_fibre(lobe.type) ? sample_fibre(lobe, seen_from, u_side, u) : sample_hair(lobe, seen_from, u);
     } else if (plan::MICROFACETS && lobe.type >= LobeType::MICROFACET_REFLECTION) {
         s = sample_microfacet(lobe, outside, seen_from, u_side, u);
     } else {
@@ -221,7 +222,7 @@ LUCH_FN void blur_closures(ClosureSet& set, float roughness) {
         lobe.flags |= LOBE_BLURRED;
         lobe.alpha_x = max_f(lobe.alpha_x, roughness);
         lobe.alpha_y = max_f(lobe.alpha_y, roughness);
-        if (plan::HAIR && lobe.type == LobeType::HAIR_FIBRE) lobe.c1.x = max_f(lobe.c1.x, roughness);
+        if (plan::FIBRES && lobe.type == LobeType::HAIR_FIBRE) lobe.c1.x = max_f(lobe.c1.x, roughness);
     }
 }
 
@@ -233,7 +234,7 @@ LUCH_FN_SLOW BsdfValue closure_albedo(const ClosureSet& set, Vec3 wo) {
         if (lobe.type < LobeType::MICROFACET_REFLECTION) {
             add_to_class(value, lobe_class(lobe, lobe.normal), lobe.weight);
         } else if (is_hair(lobe.type)) {
-            bool fibre = lobe.type == LobeType::HAIR_FIBRE;
+            bool fibre = is_fibre(lobe.type);
             add_to_class(value, lobe_class(lobe, lobe.normal),
                          fibre ? lobe.weight * fibre_albedo(lobe, wo) : lobe.weight);
         } else {

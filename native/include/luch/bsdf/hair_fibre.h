@@ -60,36 +60,50 @@ LUCH_FN float sample_around_fibre(float u, float s) {
 }
 LUCH_FN float wrapped_angle(float a) { return a - TWO_PI * floor_f((a + PI) * (1.0f / TWO_PI)); }
 
-// All that follows from the fibre and the direction to the viewer.
+// What follows from the fibre and the direction to the viewer for all lobes. What one lobe alone has is asked for as it is
+// needed, by functions of its number p: kept for all four, it would fill the registers of a GPU.
 struct Fibre {
-    Vec3 x, y, z;  // x along it, the viewer in the plane of x and z's side
+    Vec3 x, y;  // x along it, the viewer in the plane of x and z's side; z is their product
     float sin_o, cos_o, phi_o;
-    Color attenuation[FIBRE_LOBES];
-    float share[FIBRE_LOBES];  // of all lobes' light, to choose by
-    float tilted_sin[FIBRE_LOBES], tilted_cos[FIBRE_LOBES];
-    float variance[FIBRE_LOBES];
-    float turn[3];  // around the fibre, of the three lobes that keep a direction
+    float gamma_o, gamma_t;  // across the fibre: angles of the ray with the normal, outside and inside
+    float reflected;  // at its surface
+    Color through, again;  // what is left on the way across; of TRT, in all that follows
+    float sum;  // of all lobes' light
 };
 
-LUCH_FN void fibre_attenuation(const Lobe& l, float sin_o, float cos_o, Fibre* fibre) {
-    float h = fibre_offset(l), cos_gamma_o = cosine_of_sine(h), gamma_o = asin_f(h);
+LUCH_FN Vec3 fibre_z(const Fibre& fibre) { return cross(fibre.x, fibre.y); }
+
+// before: of lobe p - 1.
+LUCH_FN Color fibre_attenuation(const Fibre& fibre, int p, Color before) {
+    if (p == 0) return make_vec3(fibre.reflected);
+    if (p == 1) return fibre.through * sqr(1.0f - fibre.reflected);
+    return p == 2 ? before * fibre.through * fibre.reflected : before * fibre.again;
+}
+// Of all lobes' light, to choose by.
+LUCH_FN float fibre_share(const Fibre& fibre, Color attenuation) {
+    return safe_divide(luminance(attenuation), fibre.sum);
+}
+
+LUCH_FN void pass_fibre(const Lobe& l, Fibre* fibre) {
+    float h = fibre_offset(l), cos_gamma_o = cosine_of_sine(h), sin_o = fibre->sin_o, cos_o = fibre->cos_o;
     float sin_gamma_t = clamp_f(h * cos_o / sqrt_f(max_f(sqr(l.ior) - sqr(sin_o), SMALLEST_FIBRE_ROOT)), -1.0f, 1.0f);
-    float gamma_t = asin_f(sin_gamma_t), cos_t = cosine_of_sine(min_f(abs_f(sin_o) / l.ior, 1.0f));
+    float cos_t = cosine_of_sine(min_f(abs_f(sin_o) / l.ior, 1.0f));
+    fibre->gamma_o = asin_f(h);
+    fibre->gamma_t = asin_f(sin_gamma_t);
     float path = 2.0f * cosine_of_sine(sin_gamma_t) / max_f(cos_t, SMALLEST_COSINE);
     Color through = {exp_f(-l.c0.x * path), exp_f(-l.c0.y * path), exp_f(-l.c0.z * path)};
     float ignored, f = fresnel_dielectric(cos_o * cos_gamma_o, l.ior, &ignored);
-    const Color one = make_vec3(1.0f);
-    fibre->attenuation[0] = make_vec3(f);
-    fibre->attenuation[1] = through * sqr(1.0f - f);
-    fibre->attenuation[2] = fibre->attenuation[1] * through * f;
-    Color left = one - through * f;
-    Color again = {safe_divide(through.x * f, left.x), safe_divide(through.y * f, left.y),
-                   safe_divide(through.z * f, left.z)};
-    fibre->attenuation[3] = fibre->attenuation[2] * again;
-    float sum = 0.0f;
-    for (int p = 0; p < FIBRE_LOBES; ++p) sum += fibre->share[p] = luminance(fibre->attenuation[p]);
-    for (int p = 0; p < FIBRE_LOBES; ++p) fibre->share[p] = safe_divide(fibre->share[p], sum);
-    for (int p = 0; p < 3; ++p) fibre->turn[p] = 2.0f * float(p) * gamma_t - 2.0f * gamma_o + float(p) * PI;
+    Color left = make_vec3(1.0f) - through * f;
+    fibre->reflected = f;
+    fibre->through = through;
+    fibre->again = {safe_divide(through.x * f, left.x), safe_divide(through.y * f, left.y),
+                    safe_divide(through.z * f, left.z)};
+    fibre->sum = 0.0f;
+    Color light = {};
+    for (int p = 0; p < FIBRE_LOBES; ++p) {
+        light = fibre_attenuation(*fibre, p, light);
+        fibre->sum += luminance(light);
+    }
 }
 
 LUCH_FN Fibre make_fibre(const Lobe& l, Vec3 wo) {
@@ -98,65 +112,99 @@ LUCH_FN Fibre make_fibre(const Lobe& l, Vec3 wo) {
     make_frame(l.tangent, &t, &b);
     fibre.x = l.tangent;
     fibre.y = normalize_or(cross(fibre.x, wo), t);
-    fibre.z = cross(fibre.x, fibre.y);
     fibre.sin_o = clamp_f(dot(wo, fibre.x), -1.0f, 1.0f);
     fibre.cos_o = cosine_of_sine(fibre.sin_o);
-    fibre.phi_o = atan2_f(dot(wo, fibre.z), dot(wo, fibre.y));
-    fibre_attenuation(l, fibre.sin_o, fibre.cos_o, &fibre);
-    // Scales tilt R by 2 alpha, TT by -alpha, TRT by -4 alpha.
-    const float turns[3] = {-2.0f, 1.0f, 4.0f};
-    for (int p = 0; p < 3; ++p) {
-        float sine, cosine;
-        sincos_f(turns[p] * fibre_tilt(l), &sine, &cosine);
-        fibre.tilted_sin[p] = fibre.sin_o * cosine + fibre.cos_o * sine;
-        fibre.tilted_cos[p] = abs_f(fibre.cos_o * cosine - fibre.sin_o * sine);
-    }
-    fibre.tilted_sin[3] = fibre.sin_o;
-    fibre.tilted_cos[3] = fibre.cos_o;
-    fibre.variance[0] = fibre_coat(l);
-    fibre.variance[1] = 0.25f * l.alpha_x;
-    fibre.variance[2] = fibre.variance[3] = 4.0f * l.alpha_x;
+    fibre.phi_o = atan2_f(dot(wo, fibre_z(fibre)), dot(wo, fibre.y));
+    pass_fibre(l, &fibre);
     return fibre;
 }
 
-LUCH_FN LobeValue fibre_value(const Lobe& l, const Fibre& fibre, float sin_i, float phi) {
-    float cos_i = cosine_of_sine(sin_i);
+LUCH_FN float fibre_variance(const Lobe& l, int p) {
+    return p == 0 ? fibre_coat(l) : (p == 1 ? 0.25f : 4.0f) * l.alpha_x;
+}
+// Around the fibre, of the three lobes that keep a direction.
+LUCH_FN float fibre_turn(const Fibre& fibre, int p) {
+    return 2.0f * float(p) * fibre.gamma_t - 2.0f * fibre.gamma_o + float(p) * PI;
+}
+// Sine and cosine along the fibre of the direction that a lobe is around.
+LUCH_FN Vec2 fibre_cone(const Lobe& l, const Fibre& fibre, int p) {
+    if (p == 3) return {fibre.sin_o, fibre.cos_o};
+    // Scales tilt R by 2 alpha, TT by -alpha, TRT by -4 alpha.
+    float sine, cosine, turns = p == 0 ? -2.0f : (p == 1 ? 1.0f : 4.0f);
+    sincos_f(turns * fibre_tilt(l), &sine, &cosine);
+    return {fibre.sin_o * cosine + fibre.cos_o * sine, abs_f(fibre.cos_o * cosine - fibre.sin_o * sine)};
+}
+
+// A direction as the fibre counts it: sine of its angle along, angle around from the viewer's.
+struct FibreDirection {
+    float sin_i, phi;
+    bool transmitted;
+};
+
+LUCH_FN LobeValue fibre_value(const Lobe& l, const Fibre& fibre, const FibreDirection& to) {
+    float cos_i = cosine_of_sine(to.sin_i);
     LobeValue value = no_value();
+    Color light = {};
+    LUCH_KEEP_LOOP
     for (int p = 0; p < FIBRE_LOBES; ++p) {
-        float m = along_fibre(sin_i, cos_i, fibre.tilted_sin[p], fibre.tilted_cos[p], fibre.variance[p]);
-        float n = p < 3 ? around_fibre(wrapped_angle(phi - fibre.turn[p]), l.alpha_y) : 1.0f / TWO_PI;
-        value.f += fibre.attenuation[p] * (m * n);
-        value.pdf_sa += fibre.share[p] * (m * n);
+        Vec2 cone = fibre_cone(l, fibre, p);
+        float m = along_fibre(to.sin_i, cos_i, cone.x, cone.y, fibre_variance(l, p));
+        float n = p < 3 ? around_fibre(wrapped_angle(to.phi - fibre_turn(fibre, p)), l.alpha_y) : 1.0f / TWO_PI;
+        light = fibre_attenuation(fibre, p, light);
+        value.f += light * (m * n);
+        value.pdf_sa += fibre_share(fibre, light) * (m * n);
     }
     return value;
 }
 
-LUCH_FN_SLOW LobeValue eval_fibre(const Lobe& l, Vec3 wo, Vec3 wi) {
-    Fibre fibre = make_fibre(l, wo);
-    float phi_i = atan2_f(dot(wi, fibre.z), dot(wi, fibre.y));
-    return fibre_value(l, fibre, clamp_f(dot(wi, fibre.x), -1.0f, 1.0f), phi_i - fibre.phi_o);
+// u.z chooses the lobe, and what is left of it the angle along the fibre.
+LUCH_FN FibreDirection choose_fibre_direction(const Lobe& l, const Fibre& fibre, Vec3 u) {
+    int p = 0;
+    Color light = fibre_attenuation(fibre, 0, {});
+    float share = fibre_share(fibre, light);
+    LUCH_KEEP_LOOP
+    while (p < FIBRE_LOBES - 1 && !(u.z < share)) {
+        u.z -= share;
+        light = fibre_attenuation(fibre, ++p, light);
+        share = fibre_share(fibre, light);
+    }
+    float left = clamp_f(safe_divide(u.z, share), LEAST_FIBRE_NUMBER, 1.0f), v = fibre_variance(l, p);
+    float along = clamp_f(1.0f + v * log_f(left + (1.0f - left) * exp_f(-2.0f / v)), -1.0f, 1.0f);
+    Vec2 cone = fibre_cone(l, fibre, p);
+    float sin_i = -along * cone.x + cosine_of_sine(along) * cos_f(TWO_PI * u.y) * cone.y;
+    float phi = p < 3 ? fibre_turn(fibre, p) + sample_around_fibre(u.x, l.alpha_y) : TWO_PI * u.x;
+    return {clamp_f(sin_i, -1.0f, 1.0f), phi, p > 0};
 }
 
-// u_lobe chooses the lobe, and what is left of it the angle along the fibre.
-LUCH_FN_SLOW LobeSample sample_fibre(const Lobe& l, Vec3 wo, float u_lobe, Vec2 u) {
+// Light along a direction, given or chosen: one function, as most of the way is the same and long to compile.
+// asked: the direction, or three numbers to choose one by.
+LUCH_FN_SLOW LobeSample meet_fibre(const Lobe& l, Vec3 wo, bool choose, Vec3 asked) {
     Fibre fibre = make_fibre(l, wo);
-    int p = 0;
-    for (; p < FIBRE_LOBES - 1 && !(u_lobe < fibre.share[p]); ++p) u_lobe -= fibre.share[p];
-    float left = clamp_f(safe_divide(u_lobe, fibre.share[p]), LEAST_FIBRE_NUMBER, 1.0f), v = fibre.variance[p];
-    float along = clamp_f(1.0f + v * log_f(left + (1.0f - left) * exp_f(-2.0f / v)), -1.0f, 1.0f);
-    float sin_i = -along * fibre.tilted_sin[p] + cosine_of_sine(along) * cos_f(TWO_PI * u.y) * fibre.tilted_cos[p];
-    sin_i = clamp_f(sin_i, -1.0f, 1.0f);
-    float phi = p < 3 ? fibre.turn[p] + sample_around_fibre(u.x, l.alpha_y) : TWO_PI * u.x;
-    float sine, cosine, cos_i = cosine_of_sine(sin_i);
-    sincos_f(fibre.phi_o + phi, &sine, &cosine);
-    LobeValue value = fibre_value(l, fibre, sin_i, phi);
+    FibreDirection to;
     LobeSample s = {};
-    s.direction = normalize(fibre.x * sin_i + fibre.y * (cos_i * cosine) + fibre.z * (cos_i * sine));
+    if (choose) {
+        to = choose_fibre_direction(l, fibre, asked);
+        float sine, cosine, cos_i = cosine_of_sine(to.sin_i);
+        sincos_f(fibre.phi_o + to.phi, &sine, &cosine);
+        s.direction = normalize(fibre.x * to.sin_i + fibre.y * (cos_i * cosine) + fibre_z(fibre) * (cos_i * sine));
+        s.transmitted = to.transmitted;
+    } else {
+        float phi_i = atan2_f(dot(asked, fibre_z(fibre)), dot(asked, fibre.y));
+        to = {clamp_f(dot(asked, fibre.x), -1.0f, 1.0f), phi_i - fibre.phi_o, false};
+    }
+    LobeValue value = fibre_value(l, fibre, to);
     s.f = value.f;
     s.pdf_sa = value.pdf_sa;
+    return s;
+}
+
+LUCH_FN LobeValue eval_fibre(const Lobe& l, Vec3 wo, Vec3 wi) {
+    LobeSample s = meet_fibre(l, wo, false, wi);
+    return {s.f, s.pdf_sa};
+}
+LUCH_FN LobeSample sample_fibre(const Lobe& l, Vec3 wo, float u_lobe, Vec2 u) {
+    LobeSample s = meet_fibre(l, wo, true, {u.x, u.y, u_lobe});
     s.roughness = fibre_coat(l);
-    s.eta = 1.0f;
-    s.transmitted = p > 0;
     return s;
 }
 

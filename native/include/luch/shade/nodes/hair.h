@@ -59,7 +59,7 @@ LUCH_LOBE_OP(OpClosurePrincipledHair, 19, 2, {  // params[1]: HairColor
     p.random_roughness = read.number();
     p.random = read.number();
     p.parametrization = HairColor(params[1]);
-    if constexpr (plan::HAIR) setup_principled_hair(set, weight, p, fibre_surface(c), context);
+    if constexpr (plan::FIBRES) setup_principled_hair(set, weight, p, fibre_surface(c), context);
 });
 
 LUCH_LOBE_OP(OpClosureHair, 9, 2, {  // colour, offset, roughness along and around, tangent; params[1]: transmission
@@ -70,7 +70,7 @@ LUCH_LOBE_OP(OpClosureHair, 9, 2, {  // colour, offset, roughness along and arou
     Vec3 tangent = read.vec3();
     FibreSurface surface = fibre_surface(c);
     if (!is_zero(tangent)) surface.tangent = normalize_or(tangent, surface.tangent);
-    if constexpr (plan::HAIR)
+    if constexpr (plan::HAIR_CONES)
         setup_hair(set, weight * color, params[1] != 0, offset, along, around, surface.tangent, context);
 });
 
