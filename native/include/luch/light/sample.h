@@ -125,10 +125,8 @@ LUCH_FN LightSample no_light_sample() {
     return s;
 }
 
-LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index, const LightQuery& q, float probability,
-                                            Vec2 u) {
+LUCH_FN LightSample light_sample_at(const LightsView& lights, u32 index, const LampSample& at, float probability) {
     const LampView& lamp = lights.lamps[index];
-    LampSample at = sample_lamp(lamp, q.p, q.n, q.transmits, u);
     LightSample s = no_light_sample();
     s.pdf_sa = at.pdf_sa * probability;
     if (!at.valid || !(s.pdf_sa > 0.0f)) return s;
@@ -147,6 +145,12 @@ LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index,
     s.lightgroup = lamp.lightgroup;
     s.cast_shadow = lamp.cast_shadow;
     return s;
+}
+
+LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index, const LightQuery& q, float probability,
+                                            Vec2 u) {
+    LampSample at = sample_lamp(lights.lamps[index], q.p, q.n, q.transmits, u);
+    return light_sample_at(lights, index, at, probability);
 }
 
 LUCH_FN_SLOW LightSample sample_chosen_triangle(const SceneView& scene, Emitter emitter, const LightQuery& q,
@@ -202,10 +206,11 @@ LUCH_FN_SLOW LightSample sample_chosen_world(const WorldLight& world, const Ligh
     return s;
 }
 
-LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u,
-                                      float time = SHUTTER_MIDDLE) {
+// lamp_sample(index, probability): the sample of a chosen lamp, or none for now where the caller sees to it later.
+template <class LampSampler>
+LUCH_FN LightSample sample_light_by(const SceneView& scene, const LightQuery& q, float u_select, Vec2 u, float time,
+                                    LampSampler&& lamp_sample) {
     const LightsView& lights = *scene.lights;
-    LightQuery q = make_light_query(p, n, transmits);
     GroupShares shares;
     group_shares(lights, q, &shares);
     if (!(shares.local + shares.suns + shares.world > 0.0f)) return no_light_sample();
@@ -215,7 +220,7 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
         if (choice.emitter == NONE) return no_light_sample();
         const Emitter& emitter = lights.emitters[choice.emitter];
         float probability = choice.probability * shares.local;
-        if (plan::LAMPS && emitter.lamp != NONE) return sample_chosen_lamp(lights, emitter.lamp, q, probability, u);
+        if (plan::LAMPS && emitter.lamp != NONE) return lamp_sample(emitter.lamp, probability);
         if constexpr (!plan::EMISSIVE_MESHES) return no_light_sample();
         return sample_chosen_triangle(scene, emitter, q, probability, cluster_unit(u_select, u), u, time);
     }
@@ -224,10 +229,18 @@ LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bo
     if (plan::SUNS && shares.suns > 0.0f && (u_select < shares.suns || !(shares.world > 0.0f))) {
         EmitterChoice choice = choose_sun(lights, q, min_f(u_select / shares.suns, BELOW_ONE));
         if (choice.emitter == NONE) return no_light_sample();
-        return sample_chosen_lamp(lights, lights.suns[choice.emitter], q, choice.probability * shares.suns, u);
+        return lamp_sample(lights.suns[choice.emitter], choice.probability * shares.suns);
     }
     if (!plan::WORLD_SAMPLING || !(shares.world > 0.0f)) return no_light_sample();
     return sample_chosen_world(lights.world, q, shares.world, u);
+}
+
+LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u,
+                                      float time = SHUTTER_MIDDLE) {
+    LightQuery q = make_light_query(p, n, transmits);
+    return sample_light_by(scene, q, u_select, u, time, [&](u32 lamp, float probability) {
+        return sample_chosen_lamp(*scene.lights, lamp, q, probability, u);
+    });
 }
 
 // ---- densities for rays that found an emitter ----------------------------------------------------
