@@ -11,15 +11,15 @@ class AreaLamps {
  public:
     void clear() { count_ = 0; }
 
-    // A lamp was chosen for a point, with this probability. u: two numbers for the place. Gives the entry's index.
-    int add(const LightsView& lights, u32 lamp, Vec3 p, float probability, Vec2 u) {
-        AreaOutlook o = make_area_outlook(lights.lamps[lamp], p);
+    // A lamp was chosen for a point. u: two numbers for the place. Gives the entry's index.
+    int add(const LightsView& lights, const LightChoice& choice, Vec3 p, Vec2 u) {
+        AreaOutlook o = make_area_outlook(lights.lamps[choice.lamp], p);
         int i = count_++;
         shift_x_[i] = o.shift_x, shift_y_[i] = o.shift_y, height_[i] = o.height;
         half_u_[i] = o.half_u, half_v_[i] = o.half_v, tan_half_spread_[i] = o.tan_half_spread;
         ellipse_[i] = o.ellipse;
         u_[0][i] = u.x, u_[1][i] = u.y;
-        lamp_[i] = lamp, probability_[i] = probability;
+        lamp_[i] = choice.lamp, probability_[i] = choice.probability;
         return i;
     }
 

@@ -25,15 +25,12 @@ int Batch::choose_lights(const u32* queue, int lit_count, int* wanted) {
         if (!takes_light(set)) continue;
         LightQuery q = make_light_query(lane_position(points, lane), lane_normal(points, lane), set_transmits(set));
         Vec2 place{u[0][i], u[1][i]};
-        int& entry = area[chosen_count] = NO_AREA;
+        LightChoice choice = choose_source(lights, q, u[2][i], place);
+        if (choice.kind == EmitterKind::NONE_) continue;
+        bool is_wide = choice.kind == EmitterKind::LAMP && is_wide_area(lights.lamps[choice.lamp]);
+        area[chosen_count] = is_wide ? area_lamps.add(lights, choice, q.p, place) : NO_AREA;
+        if (!is_wide) scratch_->samples[lane] = sample_source(scene_.view, choice, q, place, lane_time(points, lane));
         chosen[chosen_count++] = lane;
-        auto lamp_sample = [&](u32 lamp, float probability) {
-            if (!is_area(lights.lamps[lamp]) || lights.lamps[lamp].delta)
-                return sample_chosen_lamp(lights, lamp, q, probability, place);
-            entry = area_lamps.add(lights, lamp, q.p, probability, place);
-            return no_light_sample();
-        };
-        scratch_->samples[lane] = sample_light_by(scene_.view, q, u[2][i], place, lane_time(points, lane), lamp_sample);
     }
     area_lamps.sample_places();
     int wanted_count = 0;

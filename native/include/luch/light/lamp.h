@@ -22,6 +22,8 @@ LUCH_FN bool is_area(const LampView& lamp) {
     if constexpr (plan::AREA_LAMPS && !plan::ROUND_LAMPS && !plan::SUNS) return true;
     return plan::AREA_LAMPS && (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE);
 }
+// What sample_area samples.
+LUCH_FN bool is_wide_area(const LampView& lamp) { return is_area(lamp) && !lamp.delta; }
 LUCH_FN bool is_round(const LampView& lamp) {
     if constexpr (plan::ROUND_LAMPS && !plan::AREA_LAMPS && !plan::SUNS) return true;
     return plan::ROUND_LAMPS && (lamp.kind == LampKind::SPHERE || lamp.kind == LampKind::DISK);
