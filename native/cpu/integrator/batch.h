@@ -91,6 +91,7 @@ class Batch {
 
     // direct_light.cpp
     void sample_lights(const u32* queue, int lit_count);
+    int choose_lights(const u32* queue, int lit_count, int* wanted);
     void emission_of_samples(const u32* queue, const int* lanes, int count);
     void push_shadow(bool made, u32 k);
 

@@ -10,16 +10,43 @@ void Batch::push_shadow(bool made, u32 k) {
     shadow_kind_[shadow_count_++] = RAY_SHADOW;
 }
 
-void Batch::sample_lights(const u32* queue, int lit_count) {
+// Lanes that a sample may light, in order; returns their number. Area lamps are chosen lane by lane and sampled together.
+int Batch::choose_lights(const u32* queue, int lit_count, int* wanted) {
+    constexpr int NO_AREA = -1;
     const ShadePoints& points = scratch_->points;
+    const LightsView& lights = *scene_.view.lights;
     const auto& u = scratch_->light_u;
-    int wanted[SHADE_LANES], wanted_count = 0;
+    AreaLamps& area_lamps = scratch_->area_lamps;
+    int chosen[SHADE_LANES], area[SHADE_LANES], chosen_count = 0;
+    area_lamps.clear();
     for (int i = 0; i < lit_count; i++) {
         int lane = scratch_->lit_lanes[i];
-        if (choose_light(scene_, paths_[ray_path_[queue[lane]]], points, lane, scratch_->sets[lane],
-                         {u[0][i], u[1][i], u[2][i]}, &scratch_->samples[lane]))
-            wanted[wanted_count++] = lane;
+        const ClosureSet& set = scratch_->sets[lane];
+        if (!takes_light(set)) continue;
+        LightQuery q = make_light_query(lane_position(points, lane), lane_normal(points, lane), set_transmits(set));
+        Vec2 place{u[0][i], u[1][i]};
+        LightChoice choice = choose_source(lights, q, u[2][i], place);
+        if (choice.kind == EmitterKind::NONE_) continue;
+        bool is_wide = choice.kind == EmitterKind::LAMP && is_wide_area(lights.lamps[choice.lamp]);
+        area[chosen_count] = is_wide ? area_lamps.add(lights, choice, q.p, place) : NO_AREA;
+        if (!is_wide) scratch_->samples[lane] = sample_source(scene_.view, choice, q, place, lane_time(points, lane));
+        chosen[chosen_count++] = lane;
     }
+    area_lamps.sample_places();
+    int wanted_count = 0;
+    for (int i = 0; i < chosen_count; i++) {
+        int lane = chosen[i];
+        LightSample& sample = scratch_->samples[lane];
+        if (area[i] != NO_AREA) sample = area_lamps.sample(lights, area[i], lane_position(points, lane));
+        if (may_light(scene_, paths_[ray_path_[queue[lane]]], sample)) wanted[wanted_count++] = lane;
+    }
+    return wanted_count;
+}
+
+void Batch::sample_lights(const u32* queue, int lit_count) {
+    const ShadePoints& points = scratch_->points;
+    int wanted[SHADE_LANES];
+    const int wanted_count = choose_lights(queue, lit_count, wanted);
     if (wanted_count == 0) return;
     emission_of_samples(queue, wanted, wanted_count);
     for (int i = 0; i < wanted_count; i++) {

@@ -1,5 +1,6 @@
 // Work space of one chunk: what lies between a stage's loops. Owned by a Batch, never allocated while tracing.
 #pragma once
+#include "cpu/integrator/area_lamps.h"
 #include "cpu/integrator/batch.h"
 #include "luch/geometry/surface.h"
 
@@ -12,6 +13,7 @@ struct Batch::Scratch {
     ShadePoints light_points;  // emitters and the world
     ClosureSet light_sets[SHADE_LANES];
     LightSample samples[SHADE_LANES];
+    AreaLamps area_lamps;
     Color emission[SHADE_LANES];
     int lit_lanes[SHADE_LANES];
     // Random numbers of the lit lanes, in their order: x, y and a choice.

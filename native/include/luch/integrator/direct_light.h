@@ -19,14 +19,22 @@ LUCH_FN bool light_is_spent(const LightsView& lights, const LightSample& s, u32 
     return s.kind == EmitterKind::WORLD && bounce > lights.world.max_bounces;
 }
 
+// Whether lights matter to the point.
+LUCH_FN bool takes_light(const ClosureSet& set) { return set.count != 0 && has_smooth_lobe(set); }
+
+// Whether a sample may bring light to the path's point.
+LUCH_FN bool may_light(const RenderView& scene, const PathState& path, const LightSample& s) {
+    if (s.kind == EmitterKind::NONE_ || !(s.pdf_sa > 0.0f)) return false;
+    return !light_is_spent(*scene.view.lights, s, path.bounce);
+}
+
 // A light for the point, or false where none can reach it. u: two numbers for the place, one for the choice.
 LUCH_FN bool choose_light(const RenderView& scene, const PathState& path, const ShadePoints& points, int lane,
                           const ClosureSet& set, Vec3 u, LightSample* s) {
-    if (set.count == 0 || !has_smooth_lobe(set)) return false;
+    if (!takes_light(set)) return false;
     *s = sample_light(scene.view, lane_position(points, lane), lane_normal(points, lane), set_transmits(set), u.z,
                       {u.x, u.y}, lane_time(points, lane));
-    if (s->kind == EmitterKind::NONE_ || !(s->pdf_sa > 0.0f)) return false;
-    return !light_is_spent(*scene.view.lights, *s, path.bounce);
+    return may_light(scene, path, *s);
 }
 
 LUCH_FN ConstantEmission emission_of(const RenderView& scene, const LightSample& s, float time) {

@@ -22,6 +22,8 @@ LUCH_FN bool is_area(const LampView& lamp) {
     if constexpr (plan::AREA_LAMPS && !plan::ROUND_LAMPS && !plan::SUNS) return true;
     return plan::AREA_LAMPS && (lamp.kind == LampKind::RECTANGLE || lamp.kind == LampKind::ELLIPSE);
 }
+// What sample_area samples.
+LUCH_FN bool is_wide_area(const LampView& lamp) { return is_area(lamp) && !lamp.delta; }
 LUCH_FN bool is_round(const LampView& lamp) {
     if constexpr (plan::ROUND_LAMPS && !plan::AREA_LAMPS && !plan::SUNS) return true;
     return plan::ROUND_LAMPS && (lamp.kind == LampKind::SPHERE || lamp.kind == LampKind::DISK);
@@ -188,81 +190,105 @@ LUCH_FN_SLOW LampSample sample_facing_disk(const LampView& lamp, Vec3 p, Vec2 u)
 
 // ---- area lamps ----------------------------------------------------------------------------------
 
-// Where on an area lamp samples fall, seen from one point: a rectangle in the lamp's axes (origin below the
-// shaded point), or a disk or ellipse inside which they are uniform by area.
-struct AreaRegion {
-    bool any, round;
-    RectangleCone box;          // round: its bounding box
-    float shift_x, shift_y;     // of the lamp's centre from the shaded point's foot
+// Looking from one point: an area lamp in its own axes, the point above the origin.
+struct AreaOutlook {
+    float shift_x, shift_y, height;  // of the lamp's centre from the point's foot; of the point over its plane
+    float half_u, half_v, tan_half_spread;
+    bool ellipse;
 };
 
-LUCH_FN_SLOW AreaRegion make_area_region(const LampView& lamp, Vec3 p) {
-    AreaRegion r{};
+LUCH_FN AreaOutlook make_area_outlook(const LampView& lamp, Vec3 p) {
     Vec3 from = p - lamp.position;
-    float height = dot(from, lamp.direction);
-    if (!(height > 0.0f)) return r;
-    r.shift_x = -dot(from, lamp.axis_u);
-    r.shift_y = -dot(from, lamp.axis_v);
-    float x0 = r.shift_x - lamp.half_u, x1 = r.shift_x + lamp.half_u;
-    float y0 = r.shift_y - lamp.half_v, y1 = r.shift_y + lamp.half_v;
-    bool ellipse = lamp.kind == LampKind::ELLIPSE;
-    r.round = ellipse;
-    if (lamp.tan_half_spread != INFINITE_DISTANCE) {
-        // Only what lies within the spread's circle around the foot sends light here.
-        float reach = height * lamp.tan_half_spread;
-        float ellipse_area = (x1 - x0) * (y1 - y0) * QUARTER_PI;
-        x0 = max_f(x0, -reach);
-        x1 = min_f(x1, reach);
-        y0 = max_f(y0, -reach);
-        y1 = min_f(y1, reach);
-        if (!(x0 < x1 && y0 < y1)) return r;
-        if (ellipse) r.round = ellipse_area <= (x1 - x0) * (y1 - y0);
-        if (r.round) {
-            x0 = r.shift_x - lamp.half_u;
-            x1 = r.shift_x + lamp.half_u;
-            y0 = r.shift_y - lamp.half_v;
-            y1 = r.shift_y + lamp.half_v;
-        }
-    }
-    r.box = make_rectangle_cone(x0, x1, y0, y1, height);
+    return {-dot(from, lamp.axis_u), -dot(from, lamp.axis_v),       dot(from, lamp.direction), lamp.half_u, lamp.half_v,
+            lamp.tan_half_spread,    lamp.kind == LampKind::ELLIPSE};
+}
+
+// Where on an area lamp samples fall: a rectangle, or a disk or ellipse inside which they are uniform by area.
+struct AreaRegion {
+    bool round;
+    RectangleCone box;  // round: its bounding box
+    float solid_angle;  // that samples are uniform in; 0: in the area
+    float area;         // 0: no light arrives
+};
+
+// Straight-line, as what follows from it: see make_rectangle_cone.
+LUCH_FN AreaRegion make_area_region(const AreaOutlook& o) {
+    float left = o.shift_x - o.half_u, right = o.shift_x + o.half_u;
+    float bottom = o.shift_y - o.half_v, top = o.shift_y + o.half_v;
+    // Only what lies within the spread's circle around the foot sends light here.
+    float reach = o.height * o.tan_half_spread;
+    float x0 = max_f(left, -reach), x1 = min_f(right, reach);
+    float y0 = max_f(bottom, -reach), y1 = min_f(top, reach);
+    // An ellipse is taken whole where that loses fewer samples than the clipped box.
+    float clipped = (x1 - x0) * (y1 - y0), whole = (right - left) * (top - bottom) * QUARTER_PI;
+    whole = o.ellipse ? whole : INFINITE_DISTANCE;
+    bool round = whole <= clipped;
+    AreaRegion r;
+    r.box = make_rectangle_cone(round ? left : x0, round ? right : x1, round ? bottom : y0, round ? top : y1, o.height);
     // A wide ellipse: uniform in the solid angle of its box, a fifth of the samples lost, beats uniform by area.
-    if (r.box.solid_angle > 0.3f) r.round = false;
-    r.any = true;
+    whole = r.box.solid_angle > 0.3f ? INFINITE_DISTANCE : whole;
+    r.round = whole <= clipped;
+    float area = (r.box.x1 - r.box.x0) * (r.box.y1 - r.box.y0);
+    area = r.round ? area * QUARTER_PI : area;
+    float angle = r.round ? 0.0f : r.box.solid_angle;
+    float room = x0 < x1 ? y1 - y0 : 0.0f;
+    room = o.height > 0.0f ? room : 0.0f;
+    r.solid_angle = room > 0.0f ? angle : 0.0f;
+    r.area = room > 0.0f ? area : 0.0f;
     return r;
 }
 
-LUCH_FN float area_region_pdf(const AreaRegion& r, float distance) {
-    if (!r.any) return 0.0f;
-    if (r.round) return area_pdf_sa(distance, r.box.height, (r.box.x1 - r.box.x0) * (r.box.y1 - r.box.y0) * QUARTER_PI);
-    return rectangle_cone_pdf(r.box, distance);
+// Of a place in an ellipse: 1 at its edge.
+LUCH_FN float ellipse_radius_squared(float half_u, float half_v, float x, float y) {
+    return sqr(x / half_u) + sqr(y / half_v);
 }
 
 LUCH_FN bool on_area_lamp(const LampView& lamp, float x, float y) {
     if (lamp.kind == LampKind::RECTANGLE) return abs_f(x) <= lamp.half_u && abs_f(y) <= lamp.half_v;
-    return sqr(x / lamp.half_u) + sqr(y / lamp.half_v) <= 1.0f;
+    return ellipse_radius_squared(lamp.half_u, lamp.half_v, x, y) <= 1.0f;
 }
 
-LUCH_FN_SLOW LampSample sample_area(const LampView& lamp, Vec3 p, Vec2 u) {
+// A place on the lamp, in its axes below the point that looks, and what its density needs.
+struct AreaPlace {
+    float x, y, height;
+    float solid_angle, area;  // as AreaRegion's; both 0: no sample
+};
+
+LUCH_FN float area_place_pdf(float solid_angle, float area, float height, float distance) {
+    return solid_angle > 0.0f ? 1.0f / solid_angle : area_pdf_sa(distance, height, area);
+}
+
+LUCH_FN AreaPlace sample_area_place(const AreaOutlook& o, Vec2 u) {
+    AreaRegion r = make_area_region(o);
+    Vec2 disk = sample_disk(u), box = sample_rectangle_cone(r.box, u);
+    float x = r.round ? o.shift_x + disk.x * o.half_u : box.x;
+    float y = r.round ? o.shift_y + disk.y * o.half_v : box.y;
+    float across = r.round ? 0.0f : ellipse_radius_squared(o.half_u, o.half_v, x - o.shift_x, y - o.shift_y);
+    across = o.ellipse ? across : 0.0f;
+    return {x, y, o.height, across <= 1.0f ? r.solid_angle : 0.0f, across <= 1.0f ? r.area : 0.0f};
+}
+
+LUCH_FN LampSample area_sample_at(const LampView& lamp, Vec3 p, const AreaPlace& place) {
     LampSample s{};
-    AreaRegion r = make_area_region(lamp, p);
-    if (!r.any) return s;
-    Vec2 q;
-    if (r.round) {
-        Vec2 d = sample_disk(u);
-        q = {r.shift_x + d.x * lamp.half_u, r.shift_y + d.y * lamp.half_v};
-    } else {
-        q = sample_rectangle_cone(r.box, u);
-        if (lamp.kind == LampKind::ELLIPSE && !on_area_lamp(lamp, q.x - r.shift_x, q.y - r.shift_y)) return s;
-    }
-    Vec3 along = lamp.axis_u * q.x + lamp.axis_v * q.y - lamp.direction * r.box.height;
+    Vec3 along = lamp.axis_u * place.x + lamp.axis_v * place.y - lamp.direction * place.height;
     s.distance = length(along);
+    s.pdf_sa = area_place_pdf(place.solid_angle, place.area, place.height, s.distance);
+    s.valid = s.pdf_sa > 0.0f && s.distance > 0.0f;
+    if (!s.valid) return s;
     s.direction = along / s.distance;
     s.point = p + along;
     s.normal = lamp.direction;
-    s.pdf_sa = area_region_pdf(r, s.distance);
     s.radiance = lamp_radiance_towards(lamp, -s.direction);
-    s.valid = s.pdf_sa > 0.0f && s.distance > 0.0f;
     return s;
+}
+
+LUCH_FN_SLOW LampSample sample_area(const LampView& lamp, Vec3 p, Vec2 u) {
+    return area_sample_at(lamp, p, sample_area_place(make_area_outlook(lamp, p), u));
+}
+
+LUCH_FN_SLOW float area_lamp_pdf(const LampView& lamp, Vec3 p, float distance) {
+    AreaRegion r = make_area_region(make_area_outlook(lamp, p));
+    return area_place_pdf(r.solid_angle, r.area, r.box.height, distance);
 }
 
 // No spread at all: parallel light from the lamp's outline.
@@ -309,6 +335,16 @@ LUCH_FN LampSample sample_point(const LampView& lamp, Vec3 p) {
     return s;
 }
 
+// What every kind of sample ends with.
+LUCH_FN void finish_lamp_sample(const LampView& lamp, LampSample* s) {
+    s->valid = s->valid && !is_zero(s->radiance);
+    if (plan::LAMP_PROGRAMS && s->valid && lamp.has_program) {
+        Vec2 uv = lamp_parametric(lamp, s->point, s->normal, -s->direction);
+        s->u = uv.x;
+        s->v = uv.y;
+    }
+}
+
 LUCH_FN_SLOW LampSample sample_lamp(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec2 u) {
     LampSample s;
     if (is_sun(lamp)) {
@@ -322,12 +358,7 @@ LUCH_FN_SLOW LampSample sample_lamp(const LampView& lamp, Vec3 p, Vec3 n, bool t
     } else {
         s = lamp.kind == LampKind::DISK ? sample_facing_disk(lamp, p, u) : sample_sphere(lamp, p, n, transmits, u);
     }
-    s.valid = s.valid && !is_zero(s.radiance);
-    if (plan::LAMP_PROGRAMS && s.valid && lamp.has_program) {
-        Vec2 uv = lamp_parametric(lamp, s.point, s.normal, -s.direction);
-        s.u = uv.x;
-        s.v = uv.y;
-    }
+    finish_lamp_sample(lamp, &s);
     return s;
 }
 
@@ -335,7 +366,7 @@ LUCH_FN_SLOW LampSample sample_lamp(const LampView& lamp, Vec3 p, Vec3 n, bool t
 LUCH_FN_SLOW float lamp_pdf(const LampView& lamp, Vec3 p, Vec3 n, bool transmits, Vec3 direction, float distance) {
     if (lamp.delta) return 0.0f;
     if (is_sun(lamp)) return 1.0f / (TWO_PI * lamp.one_minus_cos_half_angle);
-    if (is_area(lamp)) return area_region_pdf(make_area_region(lamp, p), distance);
+    if (is_area(lamp)) return area_lamp_pdf(lamp, p, distance);
     if (!is_round(lamp)) return 0.0f;
     if (lamp.kind == LampKind::SPHERE) return sphere_pdf(lamp, p, n, transmits, direction);
     return area_pdf_sa(distance, length(lamp.position - p), PI * lamp.radius * lamp.radius);

@@ -125,10 +125,8 @@ LUCH_FN LightSample no_light_sample() {
     return s;
 }
 
-LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index, const LightQuery& q, float probability,
-                                            Vec2 u) {
+LUCH_FN LightSample light_sample_at(const LightsView& lights, u32 index, const LampSample& at, float probability) {
     const LampView& lamp = lights.lamps[index];
-    LampSample at = sample_lamp(lamp, q.p, q.n, q.transmits, u);
     LightSample s = no_light_sample();
     s.pdf_sa = at.pdf_sa * probability;
     if (!at.valid || !(s.pdf_sa > 0.0f)) return s;
@@ -147,6 +145,12 @@ LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index,
     s.lightgroup = lamp.lightgroup;
     s.cast_shadow = lamp.cast_shadow;
     return s;
+}
+
+LUCH_FN_SLOW LightSample sample_chosen_lamp(const LightsView& lights, u32 index, const LightQuery& q, float probability,
+                                            Vec2 u) {
+    LampSample at = sample_lamp(lights.lamps[index], q.p, q.n, q.transmits, u);
+    return light_sample_at(lights, index, at, probability);
 }
 
 LUCH_FN_SLOW LightSample sample_chosen_triangle(const SceneView& scene, Emitter emitter, const LightQuery& q,
@@ -202,32 +206,67 @@ LUCH_FN_SLOW LightSample sample_chosen_world(const WorldLight& world, const Ligh
     return s;
 }
 
-LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u,
-                                      float time = SHUTTER_MIDDLE) {
-    const LightsView& lights = *scene.lights;
-    LightQuery q = make_light_query(p, n, transmits);
+// One among all emitters.
+struct LightChoice {
+    EmitterKind kind;   // NONE_: none
+    float probability;
+    u32 lamp;           // LAMP
+    Emitter emitter;    // TRIANGLE
+    float u_select;     // the number that chose it
+};
+
+LUCH_FN LightChoice no_light_choice(float u_select) {
+    return {EmitterKind::NONE_, 0.0f, NONE, {NONE, NONE, NONE, NONE}, u_select};
+}
+
+LUCH_FN LightChoice choose_source(const LightsView& lights, const LightQuery& q, float u_select, Vec2 u) {
+    LightChoice c = no_light_choice(u_select);
     GroupShares shares;
     group_shares(lights, q, &shares);
-    if (!(shares.local + shares.suns + shares.world > 0.0f)) return no_light_sample();
+    if (!(shares.local + shares.suns + shares.world > 0.0f)) return c;
     constexpr bool local_lights = plan::LAMPS || plan::EMISSIVE_MESHES;
     if (local_lights && u_select < shares.local) {
         EmitterChoice choice = choose_local(lights, q, &shares, min_f(u_select / shares.local, BELOW_ONE), u);
-        if (choice.emitter == NONE) return no_light_sample();
-        const Emitter& emitter = lights.emitters[choice.emitter];
-        float probability = choice.probability * shares.local;
-        if (plan::LAMPS && emitter.lamp != NONE) return sample_chosen_lamp(lights, emitter.lamp, q, probability, u);
-        if constexpr (!plan::EMISSIVE_MESHES) return no_light_sample();
-        return sample_chosen_triangle(scene, emitter, q, probability, cluster_unit(u_select, u), u, time);
+        if (choice.emitter == NONE) return c;
+        c.emitter = lights.emitters[choice.emitter];
+        c.lamp = c.emitter.lamp;
+        c.probability = choice.probability * shares.local;
+        c.kind = plan::LAMPS && c.lamp != NONE ? EmitterKind::LAMP
+                                               : (plan::EMISSIVE_MESHES ? EmitterKind::TRIANGLE : EmitterKind::NONE_);
+        return c;
     }
     u_select -= shares.local;
     // The last group takes what rounding leaves over.
     if (plan::SUNS && shares.suns > 0.0f && (u_select < shares.suns || !(shares.world > 0.0f))) {
         EmitterChoice choice = choose_sun(lights, q, min_f(u_select / shares.suns, BELOW_ONE));
-        if (choice.emitter == NONE) return no_light_sample();
-        return sample_chosen_lamp(lights, lights.suns[choice.emitter], q, choice.probability * shares.suns, u);
+        if (choice.emitter == NONE) return c;
+        c.kind = EmitterKind::LAMP;
+        c.lamp = lights.suns[choice.emitter];
+        c.probability = choice.probability * shares.suns;
+        return c;
     }
-    if (!plan::WORLD_SAMPLING || !(shares.world > 0.0f)) return no_light_sample();
-    return sample_chosen_world(lights.world, q, shares.world, u);
+    if (!plan::WORLD_SAMPLING || !(shares.world > 0.0f)) return c;
+    c.kind = EmitterKind::WORLD;
+    c.probability = shares.world;
+    return c;
+}
+
+LUCH_FN LightSample sample_source(const SceneView& scene, const LightChoice& c, const LightQuery& q, Vec2 u,
+                                  float time) {
+    const LightsView& lights = *scene.lights;
+    if ((plan::LAMPS || plan::SUNS) && c.kind == EmitterKind::LAMP)
+        return sample_chosen_lamp(lights, c.lamp, q, c.probability, u);
+    if (plan::EMISSIVE_MESHES && c.kind == EmitterKind::TRIANGLE)
+        return sample_chosen_triangle(scene, c.emitter, q, c.probability, cluster_unit(c.u_select, u), u, time);
+    if (plan::WORLD_SAMPLING && c.kind == EmitterKind::WORLD)
+        return sample_chosen_world(lights.world, q, c.probability, u);
+    return no_light_sample();
+}
+
+LUCH_FN_SLOW LightSample sample_light(const SceneView& scene, Vec3 p, Vec3 n, bool transmits, float u_select, Vec2 u,
+                                      float time = SHUTTER_MIDDLE) {
+    LightQuery q = make_light_query(p, n, transmits);
+    return sample_source(scene, choose_source(*scene.lights, q, u_select, u), q, u, time);
 }
 
 // ---- densities for rays that found an emitter ----------------------------------------------------
