@@ -17,17 +17,17 @@ struct alignas(64) LampBoxNode {
 
 // Bit per lane whose box the ray's line meets somewhere in [0, t_max], boxes padded by the host.
 LUCH_FN u32 hit_lamp_boxes(const LampBoxNode& node, Vec3 origin, Vec3 inverse, float t_max) {
-    u8 hit[LAMP_BOX_WIDTH];
+    u32 mask = 0;
     for (int i = 0; i < LAMP_BOX_WIDTH; ++i) {
         float ax = (node.low_x[i] - origin.x) * inverse.x, bx = (node.high_x[i] - origin.x) * inverse.x;
         float ay = (node.low_y[i] - origin.y) * inverse.y, by = (node.high_y[i] - origin.y) * inverse.y;
         float az = (node.low_z[i] - origin.z) * inverse.z, bz = (node.high_z[i] - origin.z) * inverse.z;
         float near = max_f(max_f(min_f(ax, bx), min_f(ay, by)), max_f(min_f(az, bz), 0.0f));
         float far = min_f(min_f(max_f(ax, bx), max_f(ay, by)), min_f(max_f(az, bz), t_max));
-        hit[i] = near <= far * LAMP_SLAB_UP && node.low_x[i] <= node.high_x[i] ? 1 : 0;
+        // Bits, not bytes: lanes of one width let the loop take the widest vectors.
+        u32 bit = near <= far * LAMP_SLAB_UP ? 1u << i : 0u;
+        mask |= node.low_x[i] <= node.high_x[i] ? bit : 0u;
     }
-    u32 mask = 0;
-    for (int i = 0; i < LAMP_BOX_WIDTH; ++i) mask |= static_cast<u32>(hit[i]) << i;
     return mask;
 }
 
