@@ -5,6 +5,7 @@ On fibers (tests/support/cuda_on_cpu.py) always; on a GPU with `-m cuda`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from luch.cuda import render as device_render
 from luch.cuda.render import DeviceRenderer
 from luch.kept import Kept
 from luch.render import Progress, render
-from luch.scene import Image, Instances, Material, Scene
+from luch.scene import Image, Instances, Light, Material, Scene
 from luch.shader import ProgramBuilder
 from support.combinations import covering_rows, scene_of
 from support.cuda_on_cpu import FIBERS
@@ -118,6 +119,22 @@ def test_a_fisheyes_circle_is_the_cpus_and_nothing_is_seen_beside_it(place: str,
     check_equal("Combined", cpu["Combined"], ours["Combined"], place)
     assert (ours["Combined"][0, 0] == (0.0, 0.0, 0.0, 1.0)).all()
     assert ours["Combined"][..., :3].any()
+
+
+@pytest.mark.parametrize("spread", [math.pi, 1.0, 0.0])
+def test_area_lamps_of_every_shape_that_a_batch_samples_together_are_those_of_one_point(
+    place: str, spread: float
+) -> None:
+    scene = everything()
+    shapes = {"SQUARE": 0.5, "RECTANGLE": 3.0, "DISK": 0.02, "ELLIPSE": 2.0}  # near and far ones, narrow and wide
+    lamps = [
+        Light(shape, "AREA", np.array(((1, 0, 0, i - 1.5), (0, 1, 0, -0.5), (0, 0, 1, 2.5)), float), power=20.0,
+              shape=shape, size=size, size_y=0.5 * size, spread=spread)
+        for i, (shape, size) in enumerate(shapes.items())
+    ]  # fmt: skip
+    cpu, _, ours, _ = both(replace(scene, lights=[*lamps, *scene.lights]))
+    check_equal("Combined", cpu["Combined"], ours["Combined"], place)
+    assert cpu["Combined"][..., :3].mean() > render(scene).passes["Combined"][..., :3].mean()
 
 
 def chalk(builder: ProgramBuilder) -> None:
