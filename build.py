@@ -73,6 +73,11 @@ def _parser() -> argparse.ArgumentParser:
     test.add_argument(
         "--sanitize", action="store_true", help="tests/native and some hard cases, with AddressSanitizer and UBSan"
     )
+    test.add_argument(
+        "--watch-kernels",
+        action="store_true",
+        help="the CUDA kernels that run on fibers, with both sanitizers (minutes)",
+    )
     fuzz = add(
         "fuzz", "Random scenes and damaged files, for as long as you like. --count, --kinds too.", passes_on=True
     )

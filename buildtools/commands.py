@@ -70,6 +70,8 @@ def test(arguments: Arguments) -> int:
     if arguments.sanitize:
         return _test_sanitized(arguments)
     _prepare(arguments)
+    if arguments.watch_kernels:
+        return _test_watched_kernels(arguments)
     return status([str(VENV_PYTHON), "-m", "pytest", *arguments.rest])
 
 
@@ -101,6 +103,24 @@ def _test_sanitized(arguments: Arguments) -> int:
     command.append("--capture=sys")  # what a sanitizer writes before it ends the process is seen
     # The CUDA kernels run there on fibers, whose stacks AddressSanitizer does not know, and from the source tree.
     command += ["-m", "not long", "--ignore", "tests/native/test_accel_cuda.py", *WATCHED]
+    return status([*command, *arguments.rest], extra=watched)
+
+
+def _test_watched_kernels(arguments: Arguments) -> int:
+    """The kernels' sources as tests/native runs them by fibers, every access to an array of the device watched."""
+    watched = {**_sanitized_environment(), "LUCH_WATCH_KERNELS": "1"}
+    del watched["LUCH_ISA"]  # the core is the usual one
+    command = [
+        str(VENV_PYTHON),
+        "-m",
+        "pytest",
+        "--capture=sys",
+        "-p",
+        "no:cacheprovider",
+        "-k",
+        "fibers",
+        "tests/native",
+    ]
     return status([*command, *arguments.rest], extra=watched)
 
 
