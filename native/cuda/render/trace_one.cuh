@@ -19,8 +19,7 @@ __device__ __forceinline__ u32* next_ray(const OneGroupRays& rays) { return rays
 __device__ __forceinline__ bool load_ray(const OneGroupRays& rays, u32 i, Ray* ray) {
     *ray = ray_of(rays.task, i);
     bool valid = clamp_interval(ray);
-    if (plan::MOTION && valid && !passes_movers_by(rays.scene, *ray, ray->t_max))
-        note_near_movers(rays.task, i);
+    if (plan::MOTION && valid && !passes_movers_by(rays.scene, *ray, ray->t_max)) note_near_movers(rays.task, i);
     return valid && (rays.scene.world_visibility & kinds_of(rays.task, i)) != 0u;
 }
 __device__ __forceinline__ void store_hit(const OneGroupRays& rays, u32 i, const RefHit& hit) {
