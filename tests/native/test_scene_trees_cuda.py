@@ -6,12 +6,12 @@ source run by fibers on the CPU, which proves their logic and the Python around 
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from luch.accel import STRUCTURES
-from luch.cuda.compiler import source_folders
 from luch.cuda.scene_kernels import structure_flags
 from luch.cuda.trace import SceneTracer, TreesTooDeep
 from support.accel_meshes import icosphere, random_rays, rows, soup
@@ -20,6 +20,7 @@ from support.instances import ALL, Scene, crowd, placed
 
 from buildtools.kernels import faults, table
 
+NATIVE = Path(__file__).resolve().parents[2] / "native"
 FEW = (
     "BRUTE_FORCE",
     "BVH2",
@@ -137,4 +138,4 @@ def test_ptx_of_scenes_obeys_the_rules_of_precision() -> None:
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_stages_can_trace_single_rays_through_any_structure(kind: str) -> None:
     """Those that look through surfaces one by one: four structures' scenes did not compile."""
-    assert compiles('#include "render/one_ray.cuh"\n', list(source_folders()), structure_flags(kind))
+    assert compiles('#include "render/one_ray.cuh"\n', [NATIVE / "include", NATIVE / "cuda"], structure_flags(kind))
