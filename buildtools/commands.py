@@ -75,16 +75,24 @@ def test(arguments: Arguments) -> int:
     return status([str(VENV_PYTHON), "-m", "pytest", *arguments.rest])
 
 
-def _sanitized_environment() -> Dict[str, str]:
-    """For a process that imports the core that `compile_sanitized` made."""
+def _watched_environment() -> Dict[str, str]:
+    """For a process that loads code which was compiled with the sanitizers."""
     # Python itself is not built with it; the C++ library must be there when it looks for what throws.
     libraries = [output(["c++", f"-print-file-name={name}"]) for name in ("libasan.so", "libstdc++.so")]
     return {
         "LD_PRELOAD": " ".join(str(library) for library in libraries),
         "ASAN_OPTIONS": "detect_leaks=0",  # Python's own, at exit
         "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1",
-        "LUCH_ISA": "v3",
     }
+
+
+def _sanitized_environment() -> Dict[str, str]:
+    """For a process that imports the core that `compile_sanitized` made."""
+    return {**_watched_environment(), "LUCH_ISA": "v3"}
+
+
+# What a sanitizer writes before it ends the process is seen.
+WATCHED_PYTEST = [str(VENV_PYTHON), "-m", "pytest", "-p", "no:cacheprovider", "--capture=sys"]
 
 
 # What runs watched: all of tests/native, and of the hard cases those that ask the core's parts one by one.
@@ -99,8 +107,7 @@ def _test_sanitized(arguments: Arguments) -> int:
     ensure_environment()
     folder = compile_sanitized(arguments.jobs)
     watched = _sanitized_environment()
-    command = [str(VENV_PYTHON), "-m", "pytest", "-o", f"pythonpath={folder} . tests", "-p", "no:cacheprovider"]
-    command.append("--capture=sys")  # what a sanitizer writes before it ends the process is seen
+    command = [*WATCHED_PYTEST, "-o", f"pythonpath={folder} . tests"]
     # The CUDA kernels run there on fibers, whose stacks AddressSanitizer does not know, and from the source tree.
     command += ["-m", "not long", "--ignore", "tests/native/test_accel_cuda.py", *WATCHED]
     return status([*command, *arguments.rest], extra=watched)
@@ -108,20 +115,8 @@ def _test_sanitized(arguments: Arguments) -> int:
 
 def _test_watched_kernels(arguments: Arguments) -> int:
     """The kernels' sources as tests/native runs them by fibers, every access to an array of the device watched."""
-    watched = {**_sanitized_environment(), "LUCH_WATCH_KERNELS": "1"}
-    del watched["LUCH_ISA"]  # the core is the usual one
-    command = [
-        str(VENV_PYTHON),
-        "-m",
-        "pytest",
-        "--capture=sys",
-        "-p",
-        "no:cacheprovider",
-        "-k",
-        "fibers",
-        "tests/native",
-    ]
-    return status([*command, *arguments.rest], extra=watched)
+    watched = {**_watched_environment(), "LUCH_WATCH_KERNELS": "1"}
+    return status([*WATCHED_PYTEST, "-k", "fibers", "tests/native", *arguments.rest], extra=watched)
 
 
 def fuzz(arguments: Arguments) -> int:

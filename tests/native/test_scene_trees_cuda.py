@@ -137,5 +137,5 @@ def test_ptx_of_scenes_obeys_the_rules_of_precision() -> None:
 
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_stages_can_trace_single_rays_through_any_structure(kind: str) -> None:
-    """Those that look through surfaces one by one: four structures' scenes did not compile."""
+    """Those that look through surfaces one by one: scenes of five structures did not compile."""
     assert compiles('#include "render/one_ray.cuh"\n', [NATIVE / "include", NATIVE / "cuda"], structure_flags(kind))

@@ -28,9 +28,8 @@ FIBERS, GPU = "fibers", "cuda"  # where a test's kernels run
 # A kernel whose parameters stand in its source: paths.cu, shadow.cuh.
 PLAIN_KERNEL = r'extern "C" __global__ void\s+(?:__launch_bounds__\([^)]*\)\s*)?(\w+)\(([^)]*RenderTask[^)]*)\)\s*{'
 FLAGS = ["-std=gnu++20", "-O1", "-march=x86-64-v3", "-ffp-contract=off", "-shared", "-fPIC", "-w"]
-if os.environ.get(
-    "LUCH_WATCH_KERNELS"
-):  # build.py test --watch-kernels; stacks are fibers', which ASan cannot tell apart
+if os.environ.get("LUCH_WATCH_KERNELS"):  # build.py test --watch-kernels
+    # Not their stacks: those are fibers', which AddressSanitizer cannot tell apart.
     FLAGS += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "--param", "asan-stack=0", "-g1"]
 
 

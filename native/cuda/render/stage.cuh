@@ -46,28 +46,24 @@ __device__ __forceinline__ OpContext context_of(const SceneView& scene, const Pr
     return {&scene, &program, &points, 0, &set, aovs};
 }
 
-// What luch/integrator's functions ask for: the light of a program at a point, of the world, a lamp or a light that was
-// chosen.
-struct PointShader {
+// What luch/integrator's functions ask for: the light of a program at a point. SURFACES: of any surface; else of the
+// world, a lamp or a light that was chosen.
+template <bool SURFACES>
+struct ProgramShader {
     const SceneView& scene;
     ClosureSet& set;
 
     __device__ __forceinline__ const ClosureSet& light(const Program& program, const ShadePoints& points) {
-        run_light_program(context_of(scene, program, points, set, nullptr));
+        const OpContext context = context_of(scene, program, points, set, nullptr);
+        if constexpr (SURFACES)
+            run_surface_light(context);
+        else
+            run_light_program(context);
         return set;
     }
 };
-
-// The same of any surface.
-struct SurfaceShader {
-    const SceneView& scene;
-    ClosureSet& set;
-
-    __device__ __forceinline__ const ClosureSet& light(const Program& program, const ShadePoints& points) {
-        run_surface_light(context_of(scene, program, points, set, nullptr));
-        return set;
-    }
-};
+using PointShader = ProgramShader<false>;
+using SurfaceShader = ProgramShader<true>;
 
 }  // namespace luch
 

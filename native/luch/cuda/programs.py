@@ -96,34 +96,30 @@ def source(programs: list[Linked], materials: int, instructions: Any, operands: 
     """
     bodies: dict[str, int] = {}
 
-    def cases(some: list[Linked], counted: str) -> list[str]:
+    def runner(name: str, some: list[Linked], counted: str, otherwise: str = "break") -> list[str]:
         called: dict[int, int] = {}
         for program in some:
             if count := getattr(program, counted):
                 body = _body(program, count, instructions, operands)
                 called[program.first_instruction] = bodies.setdefault(body, len(bodies))
-        return [f"        case {first}u: straight_{number}(c); break;" for first, number in called.items()]
+        return [
+            f"__device__ __forceinline__ void {name}(const OpContext& c) {{",
+            f"    if (c.program->{counted} == 0u) return;",
+            "    switch (c.program->first_instruction) {",
+            *(f"        case {first}u: straight_{number}(c); break;" for first, number in called.items()),
+            f"        default: {otherwise};",
+            "    }",
+            "}",
+        ]
 
     surfaces, lights = programs[:materials], programs[materials:]
     functions = [
-        *_runner("run_program", "instruction_count", cases(surfaces, "instruction_count"), "break"),
-        *_runner("run_surface_light", "light_instruction_count", cases(surfaces, "light_instruction_count"), "break"),
-        *_runner("run_light_program", "light_instruction_count", cases(lights, "light_instruction_count"),
-                 "if constexpr (plan::EMISSION_PROGRAMS) run_surface_light(c)"),
+        *runner("run_program", surfaces, "instruction_count"),
+        *runner("run_surface_light", surfaces, "light_instruction_count"),
+        *runner("run_light_program", lights, "light_instruction_count",
+                "if constexpr (plan::EMISSION_PROGRAMS) run_surface_light(c)"),
     ]  # fmt: skip
     parts = ["#pragma once", '#include "render/programs.cuh"', "namespace luch {"]
     for body, number in bodies.items():
         parts.append(f"__device__ __noinline__ void straight_{number}(const OpContext& c) {{\n{body}\n}}")
     return "\n".join([*parts, *functions, "}  // namespace luch"]) + "\n"
-
-
-def _runner(name: str, counted: str, cases: list[str], otherwise: str) -> list[str]:
-    return [
-        f"__device__ __forceinline__ void {name}(const OpContext& c) {{",
-        f"    if (c.program->{counted} == 0u) return;",
-        "    switch (c.program->first_instruction) {",
-        *cases,
-        f"        default: {otherwise};",
-        "    }",
-        "}",
-    ]

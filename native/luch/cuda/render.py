@@ -438,11 +438,10 @@ class DeviceRenderer(HostFilm):
         mean, deviation = both.reshape(2, *both.shape[:2], 3)
         return mean, deviation, before / samples if samples else 0.0
 
-    def _read(self, memory: Memory, kernel: str, channels: int, *arguments: bytes) -> Any:
+    def _read(self, memory: Memory, kernel: str, channels: int, read: bytes, *more: bytes) -> Any:
         """float32 (H, W, channels), bottom row first."""
         out = cupy().empty(memory.pixels * channels, np.float32)
-        first, *more = arguments
-        self._launch(self._paths.kernel(kernel), 0, memory.pixels, first, struct.pack("<Q", out.data.ptr), *more)
+        self._launch(self._paths.kernel(kernel), 0, memory.pixels, read, struct.pack("<Q", out.data.ptr), *more)
         width, height = self._scene.film.size
         return out.get().reshape(height, width, channels)
 
