@@ -4,7 +4,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings/bind.h"
-#include "cpu/truth_guess.h"
+#include "cpu/error_sums.h"
 
 namespace luch::bindings {
 namespace {
@@ -88,39 +88,80 @@ py::tuple film_arrays(cpu::Film& film, const py::object& owner) {
 
 namespace {
 
-using Flags = py::array_t<u8, py::array::c_style | py::array::forcecast>;
+cpu::ErrorRules error_rules(const py::dict& named) {
+    auto whole = [&](const char* name) { return named[name].cast<i64>(); };
+    return {named["dark"].cast<double>(),
+            whole("pool_radius"),
+            whole("near"),
+            whole("guide_radius"),
+            named["sure"].cast<float>(),
+            named["edge_gap"].cast<float>(),
+            named["gap_variances"].cast<float>(),
+            whole("tile"),
+            named["fireflies"].cast<double>()};
+}
 
-// Guesses at the truth for radius 1..radius, each float32 (H, W, 3).
-py::list guess_truth(const Floats& mean, const Floats& grey, const Floats& held, const Floats& noise,
-                     const Flags& known, const Flags& beside, int radius, float edge_gap) {
-    const py::ssize_t height = grey.shape(0), width = grey.shape(1);
-    for (const py::array& array :
-         {py::array(grey), py::array(held), py::array(noise), py::array(known), py::array(beside)})
-        if (array.ndim() != 2 || array.shape(0) != height || array.shape(1) != width)
-            throw py::value_error("grey, held, noise, known and beside must have one shape (H, W)");
-    if (mean.ndim() != 3 || mean.shape(0) != height || mean.shape(1) != width || mean.shape(2) != 3)
-        throw py::value_error("mean must have shape (H, W, 3)");
-    py::list guesses;
-    std::vector<float*> out;
-    for (int r = 0; r < radius; ++r) {
-        Floats guess({height, width, py::ssize_t{3}});
-        out.push_back(guess.mutable_data());
-        guesses.append(guess);
+cpu::NoisyPicture noisy_picture(const Floats& mean, const Floats& deviation, double share) {
+    for (const Floats& image : {mean, deviation})
+        if (image.ndim() != 3 || image.shape(2) != 3 || image.shape(0) != mean.shape(0) ||
+            image.shape(1) != mean.shape(1))
+            throw py::value_error("mean and deviation must have one shape (H, W, 3)");
+    return {mean.shape(0), mean.shape(1), mean.data(), deviation.data(), share};
+}
+
+// threads 0: all processors, one where the picture is not worth more.
+unsigned threads_for(const cpu::NoisyPicture& picture, unsigned threads) {
+    return threads == 0 && picture.height * picture.width < 16384 ? 1 : threads;
+}
+
+// Of each guess at the truth, the nearest first: float64 (H, W).
+py::list relative_squares(const Floats& mean, const Floats& deviation, double share, const py::dict& named,
+                          unsigned threads) {
+    const cpu::NoisyPicture picture = noisy_picture(mean, deviation, share);
+    const cpu::ErrorRules rules = error_rules(named);
+    py::list squares;
+    std::vector<double*> out;
+    for (i64 guess = 0; guess < rules.guide_radius; ++guess) {
+        py::array_t<double> plane({mean.shape(0), mean.shape(1)});
+        out.push_back(plane.mutable_data());
+        squares.append(plane);
     }
-    const cpu::NoisyPicture picture{height,      width,        mean.data(),  grey.data(),
-                                    held.data(), noise.data(), known.data(), beside.data()};
     py::gil_scoped_release release;
-    cpu::ThreadPool pool(height * width < 65536 ? 1 : 0);
-    cpu::guess_truth(picture, radius, edge_gap, out.data(), pool);
-    return guesses;
+    cpu::ThreadPool pool(threads_for(picture, threads));
+    cpu::relative_squares(picture, rules, out.data(), pool);
+    return squares;
+}
+
+py::dict error_sums(const Floats& mean, const Floats& deviation, double share, const py::dict& named,
+                    unsigned threads) {
+    const cpu::NoisyPicture picture = noisy_picture(mean, deviation, share);
+    const cpu::ErrorRules rules = error_rules(named);
+    cpu::ErrorSums sums;
+    {
+        py::gil_scoped_release release;
+        cpu::ThreadPool pool(threads_for(picture, threads));
+        sums = cpu::error_sums(picture, rules, pool);
+    }
+    py::array_t<double> tiles({py::ssize_t(sums.tile_rows), py::ssize_t(sums.tile_columns)});
+    std::copy(sums.tiles.begin(), sums.tiles.end(), tiles.mutable_data());
+    py::dict told;
+    told["pixels"] = sums.pixels;
+    told["squares"] = sums.squares;
+    told["pooled"] = sums.pooled;
+    told["largest"] = sums.largest;
+    told["brightness"] = sums.brightness;
+    told["tiles"] = tiles;
+    return told;
 }
 
 }  // namespace
 
 void bind_film(py::module_& m) {
     auto film = m.def_submodule("film", "Sums of samples, and render passes read from them.");
-    film.def("guess_truth", &guess_truth, py::arg("mean"), py::arg("grey"), py::arg("held"), py::arg("noise"),
-             py::arg("known"), py::arg("beside"), py::arg("radius"), py::arg("edge_gap"));
+    film.def("relative_squares", &relative_squares, py::arg("mean"), py::arg("deviation"), py::arg("share"),
+             py::arg("rules"), py::arg("threads") = 0);
+    film.def("error_sums", &error_sums, py::arg("mean"), py::arg("deviation"), py::arg("share"), py::arg("rules"),
+             py::arg("threads") = 0);
     py::class_<cpu::Film>(film, "Film")
         .def(py::init([](const py::handle& settings, const py::handle& origin, bool marks) {
                  cpu::FilmSpec spec = read_film(settings, origin);

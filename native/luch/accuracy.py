@@ -104,93 +104,41 @@ def box_sum(image: F64, radius: int = POOL_RADIUS) -> F64:
     return _sums(_sums(image, radius, 0), radius, 1)
 
 
-def _measured(deviation: F32) -> tuple[F64, F64, F64]:
-    """Deviations with 0 where nothing is known, 1 or 0 for what is known (H, W, 1), and its sums over neighbours."""
-    known = np.isfinite(deviation).all(axis=2, keepdims=True)
-    return (
-        np.where(known, deviation, 0.0).astype(np.float64),
-        known.astype(np.float64),
-        box_sum(known.astype(np.float64)),
-    )
+def _rules() -> dict[str, float]:
+    """The constants above, for the core."""
+    return {
+        "dark": DARK,
+        "pool_radius": POOL_RADIUS,
+        "near": NEAR,
+        "guide_radius": GUIDE_RADIUS,
+        "sure": SURE,
+        "edge_gap": EDGE_GAP,
+        "gap_variances": GAP_VARIANCES,
+        "tile": TILE,
+        "fireflies": FIREFLIES,
+    }
 
 
-def _borne_out(grey: F32, d: F64, share: float) -> F32:
-    """What both parts of a pixel's samples bear out of its brightness: their harmonic mean.
+def relative_squares(mean: F32, deviation: F32, share: float) -> list[F64]:
+    """Squared deviations over what the truth may be, means of the channels, (H, W); 0 where nothing is known. Their
+    mean is the relMSE.
 
-    Parts that agree have all of it. Of a firefly, which one part alone has found, next to nothing: a harmonic mean is
-    at most the smaller part over the larger part's share of the samples.
-    """
-    other = grey + d * (1.0 - 2.0 * share) / np.sqrt(share * (1.0 - share))  # the two, weighted the other way round
-    lost = np.divide(d * d, other, out=np.full_like(other, np.inf), where=other > 0.0)
-    return np.asarray(np.clip(grey - lost, 0.0, np.maximum(grey, 0.0)), dtype=np.float32)
-
-
-def _truth_guesses(mean: F32, d: F64, known: F64, share: float) -> list[F32]:
-    """What each pixel is divided by: the truth is not known, and a pixel's own noise must not hide its error.
-
-    The mean of those neighbours whose brightness differs by no more than noise explains (Lee's sigma filter, 1983),
-    and, as one more of them, of what the pixel's own samples agree upon: an edge keeps its two sides, a highlight
-    counts by half, a firefly is held against what lies around it. Noise is what neighbours have in proportion to their
+    share: of the samples that the first part holds. One for each guess at the truth, from neighbours up to 1, 2, ...
+    GUIDE_RADIUS pixels away; the first is the best: the nearest neighbours were off by half as much as those two pixels
+    away (twelve scenes). The truth is not known, and a pixel's own noise must not hide its error. So it is guessed: the
+    mean of those neighbours whose brightness differs by no more than noise explains (Lee's sigma filter, 1983), and, as
+    one more of them, of what the pixel's own samples agree upon: an edge keeps its two sides, a highlight counts by
+    half, a firefly is held against what lies around it. Noise is what neighbours have in proportion to their
     brightness; by a firefly's own noise any neighbour would do. For the same reason a pixel is compared by the mean of
-    its brightness and what is borne out of it. One guess for each radius of GUIDE_RADIUS..1; the nearest neighbours
-    were off by half as much as those two pixels away (twelve scenes).
+    its brightness and what is borne out of it: the harmonic mean of its two parts. Parts that agree have all of it; of
+    a firefly, which one part alone has found, next to nothing is borne out, as a harmonic mean is at most the smaller
+    part over the larger part's share of the samples. A pixel that touches a surely brighter one, and is EDGE_GAP times
+    its guess, speaks for itself: what makes it bright may be that one's edge, seen by few samples. Against dark
+    neighbours alone, a lamp's edge would count as a firefly whose error is a thousand times the truth.
     """
-    grey = (known[..., 0] * mean.mean(axis=2)).astype(np.float32)
-    deviation = d.mean(axis=2)
-    lit = box_sum((grey * grey).astype(np.float64))
-    relative = np.divide(box_sum(deviation**2), lit, out=np.zeros_like(lit), where=lit > 0.0)
-    noise = (GAP_VARIANCES * relative).astype(np.float32) * grey * grey
     from luch._native import core  # not needed by those who only read numbers
 
-    beside = _beside_bright(grey, np.abs(d).mean(axis=2).astype(np.float32))
-    held = _borne_out(grey, deviation, share)
-    guesses = core.film.guess_truth(mean, grey, held, noise, known[..., 0] > 0.0, beside, GUIDE_RADIUS, EDGE_GAP)
-    return list(guesses)[::-1]
-
-
-def _beside_bright(grey: F32, deviation: F32) -> NDArray[np.bool_]:
-    """Pixels that touch a surely brighter one, (H, W). What makes them bright may be its edge, seen by few samples.
-
-    Against dark neighbours alone, a lamp's edge would count as a firefly whose error is a thousand times the truth.
-    """
-    sure = np.where(deviation <= SURE * grey, grey, np.float32(0.0))
-    brightest = np.zeros_like(grey)
-    height, width = grey.shape
-    for dy, dx in _ring(1):
-        here = slice(max(0, -dy), max(0, height - dy)), slice(max(0, -dx), max(0, width - dx))
-        there = slice(max(0, dy), max(0, height + dy)), slice(max(0, dx), max(0, width + dx))
-        np.maximum(brightest[here], sure[there], out=brightest[here])
-    return np.asarray(brightest >= grey)
-
-
-def _ring(radius: int) -> list[tuple[int, int]]:
-    """Offsets (dy, dx) of the pixels on a square of that radius."""
-    steps = range(-radius, radius + 1)
-    return [(dy, dx) for dy in steps for dx in steps if max(abs(dy), abs(dx)) == radius]
-
-
-def relative_deviations(mean: F32, deviation: F32, share: float) -> list[F64]:
-    """Deviations over what the truth may be, (H, W, 3); 0 where nothing is known. Mean square: the relMSE.
-
-    share: of the samples that the first part holds. One for each guess at the truth; the last is the best.
-    """
-    d, known, _ = _measured(deviation)
-    mean = np.where(known > 0.0, mean, np.float32(0.0))
-    # Squares of floats stay floats: no colour above 1.
-    unit = max(float(np.abs(mean).max()), float(np.finfo(np.float32).tiny))
-
-    guesses = _truth_guesses(mean / np.float32(unit), d / unit, known, share)
-    return [d / (np.abs(truth).astype(np.float64) * unit + DARK) for truth in guesses]
-
-
-def _square(deviation: F64) -> F64:
-    return np.asarray(np.mean(deviation * deviation, axis=2))
-
-
-def _tile_sums(image: F64) -> F64:
-    """Sums over tiles of TILE^2 pixels, cut at the far borders: (H, W) -> (rows, columns)."""
-    rows = np.add.reduceat(image, np.arange(0, image.shape[0], TILE), axis=0)
-    return np.asarray(np.add.reduceat(rows, np.arange(0, image.shape[1], TILE), axis=1))
+    return list(core.film.relative_squares(mean, deviation, share, _rules()))
 
 
 def estimate(mean: F32, deviation: F32, share: float = 0.5) -> Estimate | None:
@@ -203,28 +151,27 @@ def estimate(mean: F32, deviation: F32, share: float = 0.5) -> Estimate | None:
     square of the expectation, and widen the interval. So do what guesses at the truth are off by, and
     their disagreement.
     """
-    d, known, _ = _measured(deviation)
-    pixels = float(known.sum())
+    from luch._native import core
+
+    sums = core.film.error_sums(mean, deviation, share, _rules())
+    pixels = float(sums["pixels"])
     if pixels == 0.0:
         return None
-    *rougher, scaled = relative_deviations(mean, deviation, share)
-    squares = _square(scaled)
-    mse = float(squares.sum()) / pixels
-    pooled = np.maximum(box_sum(squares, NEAR), 0.0) / np.maximum(box_sum(known[..., 0], NEAR), 1.0)
-    noise = 2.0 * float(np.sqrt(np.sum(pooled * pooled * known[..., 0]))) / pixels
+    nearest, *rougher = sums["squares"]  # of relative_squares, added up
+    mse = nearest / pixels
+    noise = 2.0 * float(np.sqrt(sums["pooled"])) / pixels
     factor = 1.0
     if mse > 0.0:
-        guess = max(abs(np.log(float(_square(other).sum()) / pixels / mse)) for other in rougher)
+        guess = max(abs(np.log(other / nearest)) for other in rougher)
         factor = float(np.exp(0.5 * np.hypot(NORMAL_95 * np.hypot(noise / mse, GUESS_SPREAD), guess)))
-    top = np.sort(squares[known[..., 0] > 0.0])[-max(1, round(FIREFLIES * pixels)) :]
-    brightness = float((known * np.where(known > 0.0, mean, 0.0)).sum()) / (3.0 * pixels)
-    uncertainty = _uncertainty_of_sum(_tile_sums(d.mean(axis=2))) / pixels
+    brightness = sums["brightness"] / pixels
+    uncertainty = _uncertainty_of_sum(sums["tiles"]) / pixels
     error = float(np.sqrt(mse))
     return Estimate(
         error=error,
         error_low=error / factor,
         error_high=error * factor,
-        fireflies_share=float(top.sum() / squares.sum()) if mse > 0.0 else 0.0,
+        fireflies_share=sums["largest"] / nearest if mse > 0.0 else 0.0,
         brightness=brightness,
         brightness_low=brightness - uncertainty,
         brightness_high=brightness + uncertainty,

@@ -32,10 +32,13 @@ from luch.watching import WATCH_SECONDS, watched
 
 # Steps grow until one takes about this long; longer steps show the picture too seldom.
 STEP_SECONDS = 4.0
-# The error is looked at where that takes at most this share of the time so far: of all time 2 %, as looks lie a third
-# to a half apart. A look takes about so many seconds a pixel on one processor of 2024, until one was measured.
-LOOK_SHARE = 0.007
-LOOK_SECONDS = 0.7e-6
+# The error is looked at where that takes at most this share of the time so far: of all time 1 %, as looks lie a third
+# to a half apart. Where an error is to end the render it may take more, 4.5 % of all time at the worst: the look that is
+# left out costs all samples up to the next one.
+LOOK_SHARE, LOOK_SHARE_ASKED = 0.007, 0.03
+# Of one processor of 2024, for a pixel: what a look is taken to cost beforehand. Whether there is one must not depend
+# on what it took the last time: the first in a process takes ten times as long as those after it.
+LOOK_SECONDS = 0.2e-6
 CANCEL_LOOK_SECONDS = 0.2  # the longest that who cancels waits for: a look at 3840 x 2160 pixels takes seconds
 QUICK_LOOK_SECONDS = 0.02  # taken however short the render, where an error is asked for
 # What reading passes takes at the end of a render that may only take so long; seconds a pixel and channel.
@@ -144,9 +147,8 @@ class _Loop:
         self.prepared = start
         self.cancelled = self.timed_out = False
         pixels = scene.film.pixels
-        self._look_cost = LOOK_SECONDS * pixels / max(1, os.cpu_count() or 1) if settings.estimate_error else 0.0
-        # Of this thread alone: what other work on the machine adds to the wall's clock must not put off the next look.
-        self._look_busy = self._look_cost
+        self._look_expected = LOOK_SECONDS * pixels / max(1, os.cpu_count() or 1) if settings.estimate_error else 0.0
+        self._look_cost = self._look_expected  # of the last one
         self._passes_cost = PASS_SECONDS * pixels * (4 + 3 * len(scene.film.passes))
 
     @property
@@ -217,24 +219,27 @@ class _Loop:
             points.pop()  # the film may hold more since: parts of a step that was cut off
         elif seen:
             return
-        allowed = self.pace.look_share * self.seconds
-        if self.settings.error_limit > 0.0:
-            allowed = max(allowed, QUICK_LOOK_SECONDS)
-        # Where samples go must not depend on how fast the machine is.
         due = self.done == self.stopping.next_look(self.done - 1)
-        due = due and (self._look_busy <= allowed or self.adaptive is not None)
+        # Where samples go must not depend on how fast the machine is.
+        due = due and (self._look_expected <= self._look_allowed or self.adaptive is not None)
         asked = self.done == self.stopping.settled
         if not self.settings.estimate_error or not (last or due or asked):
             return
-        began, busy = time.perf_counter(), time.thread_time()
+        began = time.perf_counter()
         mean, deviation, share = self.renderer.deviations()
         found = accuracy.estimate(mean, deviation, share)
         self._look_cost = time.perf_counter() - began
-        self._look_busy = time.thread_time() - busy
         if found is not None:
             self.curve.add(self.done, self.seconds, found, share)
             if not self.stopping.look(self.curve) and self.adaptive is not None:
                 self.adaptive.decide(mean, deviation, share, self.done)
+
+    @property
+    def _look_allowed(self) -> float:
+        """Seconds that a look may take now."""
+        if self.settings.error_limit > 0.0:
+            return max(max(self.pace.look_share, LOOK_SHARE_ASKED) * self.seconds, QUICK_LOOK_SECONDS)
+        return self.pace.look_share * self.seconds
 
     def _fraction(self, samples: float) -> float:
         """Of the whole work: whichever end is nearer."""

@@ -9,6 +9,7 @@ import pytest
 from luch import accuracy, pixel_error
 from luch._native import core
 from luch.scene import F32
+from support import error_oracle
 
 SIZE = 40
 TRIALS = 40
@@ -158,36 +159,44 @@ def test_parts_of_scrambled_nets_overstate_as_nested_nets_do(first: int, count: 
     assert told / squared(count) == pytest.approx(accuracy.overstated(share, rate), rel=0.12)
 
 
-def test_guesses_at_the_truth_are_means_of_neighbours_that_noise_may_explain() -> None:
-    """The core's loops against the rule spelled out, pixel by pixel."""
-    rng = np.random.default_rng(6)
-    height, width, gap = 9, 7, 3.0
-    mean = rng.gamma(1.0, 1.0, (height, width, 3)).astype(np.float32)
-    grey, noise = mean.mean(axis=2), rng.gamma(1.0, 0.2, (height, width)).astype(np.float32)
-    held = (grey * rng.random((height, width))).astype(np.float32)
-    known, beside = rng.random((2, height, width)) > 0.3
-    for radius, guess in enumerate(core.film.guess_truth(mean, grey, held, noise, known, beside, 2, gap), start=1):
-        for y in range(height):
-            for x in range(width):
-                around = [
-                    mean[v, u]
-                    for v in range(max(0, y - radius), min(height, y + radius + 1))
-                    for u in range(max(0, x - radius), min(width, x + radius + 1))
-                    if (v, u) != (y, x) and known[v, u]
-                    and ((grey[y, x] + held[y, x]) / 2 - grey[v, u]) ** 2 <= noise[y, x] + noise[v, u]
-                ]  # fmt: skip
-                right = np.mean([*around, mean[y, x] * held[y, x] / grey[y, x]], axis=0)
-                right = np.where(beside[y, x] & (mean[y, x] > gap * right), mean[y, x], right)
-                np.testing.assert_allclose(guess[y, x], right, rtol=1e-5)
-    with pytest.raises(ValueError, match="one shape"):
-        core.film.guess_truth(mean, grey, held, noise[1:], known, beside, 2, gap)
+@pytest.mark.parametrize("share", [0.5, 0.7])
+def test_the_cores_sums_are_those_of_the_rule_spelled_out(share: float) -> None:
+    """Pixel by pixel: guesses at the truth, squares by them, and what the estimate is made of."""
+    mean, deviation = error_oracle.film(np.random.default_rng(6))
+    right = error_oracle.relative_squares(mean, deviation, share)
+    found = accuracy.relative_squares(mean, deviation, share)
+    assert len(found) == len(right) == accuracy.GUIDE_RADIUS
+    for squares, wanted in zip(found, right, strict=True):
+        np.testing.assert_allclose(squares, wanted, rtol=2e-5)
+    estimated, wanted = accuracy.estimate(mean, deviation, share), error_oracle.estimate(mean, deviation, share)
+    assert estimated is not None and estimated.statistics() == pytest.approx(wanted, rel=1e-5)
+
+
+def test_the_cores_sums_are_the_same_with_any_number_of_threads() -> None:
+    rng = np.random.default_rng(8)
+    mean = rng.gamma(1.0, 1.0, (75, 130, 3)).astype(np.float32)
+    deviation = (0.3 * mean * rng.normal(size=mean.shape)).astype(np.float32)
+    one, three = (core.film.error_sums(mean, deviation, 0.4, accuracy._rules(), threads) for threads in (1, 3))
+    assert np.array_equal(one.pop("tiles"), three.pop("tiles")) and one == three
+    planes = [core.film.relative_squares(mean, deviation, 0.4, accuracy._rules(), threads) for threads in (1, 3)]
+    assert np.array_equal(*planes)
+
+
+def test_images_of_different_shapes_are_refused() -> None:
+    image = np.ones((4, 5, 3), np.float32)
+    for wrong in (image[:3], image[..., :2], image[0]):
+        with pytest.raises(ValueError, match="one shape"):
+            accuracy.relative_squares(image, wrong, 0.5)
 
 
 @pytest.mark.parametrize("share", [0.5, 1.0 / 3.0, 2.0 / 3.0])
 def test_a_firefly_is_not_borne_out_and_parts_that_agree_are(share: float) -> None:
-    """Whichever part found it, however many samples that part has; deviations as the film writes them."""
+    """Whichever part found it, however many samples that part has; deviations as the film writes them. A pixel alone is
+    divided by what is borne out of it.
+    """
     for first, rest in ((9.0, 0.0), (0.0, 9.0), (3.0, 3.0), (2.0, 4.0)):
-        grey = np.full((1, 1), share * first + (1.0 - share) * rest, np.float32)
-        deviation = np.full((1, 1), (first - rest) * np.sqrt(share * (1.0 - share)))
+        mean = np.full((1, 1, 3), share * first + (1.0 - share) * rest, np.float32)
+        deviation = np.full((1, 1, 3), (first - rest) * np.sqrt(share * (1.0 - share)), np.float32)
         right = 1.0 / (share / first + (1.0 - share) / rest) if first and rest else 0.0
-        assert accuracy._borne_out(grey, deviation, share)[0, 0] == pytest.approx(right, abs=1e-5)
+        square = accuracy.relative_squares(mean, deviation, share)[0][0, 0]
+        assert np.sqrt(square) == pytest.approx(abs(deviation[0, 0, 0]) / (right + accuracy.DARK), rel=1e-4)

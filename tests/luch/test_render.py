@@ -6,9 +6,11 @@ import re
 import sys
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from luch import accuracy
 from luch._native import core
 from luch.accel import KINDS
 from luch.cuda import device
@@ -147,6 +149,33 @@ def test_a_time_limit_is_kept_with_building_and_reading_and_true_samples_are_tol
     assert result.stats["stopped_by"] == "time" and result.stats["samples"] < result.stats["samples_asked"] == 1 << 20
     assert counts.min() >= result.stats["samples"] and counts.max() < 4 * result.stats["samples"]
     assert result.stats["total_seconds"] == pytest.approx(taken, abs=0.1)
+
+
+def test_a_first_look_that_takes_long_puts_no_other_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first in a process touches new memory: it cost a small picture the looks after it, which took up to 4,096
+    samples in place of 48. What a look took does not decide where the next one is.
+    """
+    plain = accuracy.estimate
+
+    def looks(slow: bool) -> list[int]:
+        taken: list[int] = []
+
+        def estimate(*film: Any) -> Any:
+            began = time.thread_time()
+            while slow and not taken and time.thread_time() - began < 0.5:
+                pass
+            taken.append(len(taken))
+            return plain(*film)
+
+        monkeypatch.setattr(accuracy, "estimate", estimate)
+        scene = heavy_scene(50)
+        scene.settings = replace(scene.settings, error_limit=0.1, samples=1 << 12)
+        result = render(scene)
+        assert result.stats["stopped_by"] == "error"
+        return [len(taken), result.stats["samples"]]
+
+    at_once = looks(slow=False)
+    assert at_once[0] >= 3 and looks(slow=True) == at_once
 
 
 def test_whatever_error_is_asked_for_a_render_ends() -> None:
