@@ -1,171 +1,12 @@
 #include "cpu/error_sums.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdlib>
-#include <limits>
-#include <memory>
+#include <functional>
+
+#include "cpu/error_planes.h"
 
 namespace luch::cpu {
 namespace {
-
-constexpr size_t ROWS = 16;  // a thread's portion
-
-using Row = std::vector<double>;
-using FloatRow = std::vector<float>;
-
-// A picture's worth of numbers, not set: the threads that fill it touch its memory first.
-template <class T>
-class PlaneOf {
- public:
-    explicit PlaneOf(size_t size) : numbers_(new T[size]) {}
-    T& operator[](size_t at) { return numbers_[at]; }
-    const T& operator[](size_t at) const { return numbers_[at]; }
-    T* data() { return numbers_.get(); }
-    const T* data() const { return numbers_.get(); }
-
- private:
-    std::unique_ptr<T[]> numbers_;
-};
-using Plane = PlaneOf<float>;
-
-// Calls body(x) for the pixels of a row whose neighbour at x + dx is in it, too.
-template <class Body>
-void for_neighbours(i64 width, i64 dx, Body&& body) {
-    const i64 first = std::max<i64>(0, -dx), last = std::min(width, width - dx);
-#pragma GCC ivdep
-    for (i64 x = first; x < last; ++x) body(x);
-}
-// Adds to each the sum of its neighbours in a row, up to radius away.
-template <class T>
-void add_box(const T* row, i64 width, i64 radius, double* to) {
-    for (i64 dx = -radius; dx <= radius; ++dx) for_neighbours(width, dx, [=](i64 x) { to[x] += double(row[x + dx]); });
-}
-
-// A picture's rows taken apart, in units of its brightest value: squares of floats then stay floats.
-class Planes {
- public:
-    Planes(const NoisyPicture& picture, const ErrorRules& rules, ThreadPool& pool)
-        : height(picture.height), width(picture.width), picture_(picture), rules_(rules) {
-        unit = largest_value(pool);
-        for_rows(pool, [&](i64 y) { take_apart(y); });
-        for_rows(pool, [&](i64 y) { add_along_row(y); });
-        for_rows(pool, [&](i64 y) { judge(y); });
-    }
-
-    template <class Body>
-    void for_rows(ThreadPool& pool, Body&& body) const {
-        pool.parallel_for(size_t(height), ROWS, [&](size_t begin, size_t end, unsigned) {
-            for (i64 y = i64(begin); y < i64(end); ++y) body(y);
-        });
-    }
-
-    bool is_known(i64 pixel) const { return known[size_t(pixel)] > 0.0f; }
-    double deviation(i64 pixel, int k) const {
-        return is_known(pixel) ? double(picture_.deviation[3 * pixel + k]) : 0.0;
-    }
-    const float* row(const Plane& plane, i64 y) const { return plane.data() + y * width; }
-
-    const i64 height, width;
-    const size_t size = size_t(height * width);
-    float unit;
-    Plane mean[3] = {Plane(size), Plane(size), Plane(size)};
-    Plane grey{size};
-    Plane held{size};    // what both parts of the samples bear out of grey
-    Plane noise{size};   // variance of grey that a gap to a neighbour may have
-    Plane known{size};   // 1; 0: says nothing of its neighbours
-    Plane sure{size};    // grey where deviations tell that it is there, else 0
-    Plane beside{size};  // 1: touches a surely brighter one, or one as bright
-
- private:
-    float largest_value(ThreadPool& pool) const {
-        std::vector<float> rows(size_t(height), 0.0f);
-        for_rows(pool, [&](i64 y) {
-            float most = 0.0f;
-            for (i64 pixel = y * width; pixel < (y + 1) * width; ++pixel)
-                if (has_both_parts(pixel))
-                    for (int k = 0; k < 3; ++k) most = std::max(most, std::abs(picture_.mean[3 * pixel + k]));
-            rows[size_t(y)] = most;
-        });
-        float most = rows.empty() ? 0.0f : *std::max_element(rows.begin(), rows.end());
-        return std::max(most, std::numeric_limits<float>::min());
-    }
-    bool has_both_parts(i64 pixel) const {
-        const float* d = picture_.deviation + 3 * pixel;
-        return std::isfinite(d[0]) && std::isfinite(d[1]) && std::isfinite(d[2]);
-    }
-
-    void take_apart(i64 y) {
-        const double share = picture_.share, both = share * (1.0 - share);
-        const double other_way = both > 0.0 ? (1.0 - 2.0 * share) / std::sqrt(both) : 0.0;
-        for (i64 pixel = y * width; pixel < (y + 1) * width; ++pixel) {
-            const size_t at = size_t(pixel);
-            const bool there = has_both_parts(pixel);
-            const float* d = picture_.deviation + 3 * pixel;
-            known[at] = there ? 1.0f : 0.0f;
-            for (int k = 0; k < 3; ++k) mean[k][at] = there ? picture_.mean[3 * pixel + k] / unit : 0.0f;
-            grey[at] = (mean[0][at] + mean[1][at] + mean[2][at]) / 3.0f;
-            const double scale = there ? 1.0 / (3.0 * unit) : 0.0;
-            const double own = there ? (double(d[0]) + d[1] + d[2]) * scale : 0.0;
-            const double magnitude =
-                there ? (std::abs(double(d[0])) + std::abs(double(d[1])) + std::abs(double(d[2]))) * scale : 0.0;
-            spread_[at] = own;
-            sure[at] = float(magnitude) <= rules_.sure * grey[at] ? grey[at] : 0.0f;
-            held[at] = borne_out(grey[at], own, other_way);
-        }
-    }
-    // The harmonic mean of the pixel's two parts.
-    static float borne_out(float grey, double d, double other_way) {
-        const double other = grey + d * other_way;  // the two, weighted the other way round
-        if (!(other > 0.0)) return 0.0f;
-        return float(std::clamp(grey - d * d / other, 0.0, double(std::max(grey, 0.0f))));
-    }
-
-    // Squares of grey and of deviations, over the neighbours in the row.
-    void add_along_row(i64 y) {
-        const float* light = row(grey, y);
-        const double* deviations = spread_.data() + y * width;
-        Row lit(size_t(width), 0.0), spread(size_t(width), 0.0);
-        for (i64 x = 0; x < width; ++x) {
-            lit[size_t(x)] = double(light[x]) * light[x];
-            spread[size_t(x)] = deviations[x] * deviations[x];
-        }
-        double *to_lit = lit_along_.data() + y * width, *to_spread = spread_along_.data() + y * width;
-        std::fill_n(to_lit, width, 0.0);
-        std::fill_n(to_spread, width, 0.0);
-        add_box(lit.data(), width, rules_.pool_radius, to_lit);
-        add_box(spread.data(), width, rules_.pool_radius, to_spread);
-    }
-
-    void judge(i64 y) {
-        Row lit(size_t(width), 0.0), spread(size_t(width), 0.0);
-        for (i64 v = std::max<i64>(0, y - rules_.pool_radius); v <= std::min(height - 1, y + rules_.pool_radius); ++v) {
-            const double *more = lit_along_.data() + v * width, *wider = spread_along_.data() + v * width;
-            for (i64 x = 0; x < width; ++x) {
-                lit[size_t(x)] += more[x];
-                spread[size_t(x)] += wider[x];
-            }
-        }
-        FloatRow brightest(size_t(width), 0.0f);
-        for (i64 v = std::max<i64>(0, y - 1); v <= std::min(height - 1, y + 1); ++v)
-            for (i64 dx = -1; dx <= 1; ++dx)
-                if (v != y || dx != 0)
-                    for_neighbours(width, dx, [to = brightest.data(), from = row(sure, v), dx](i64 x) {
-                        to[x] = std::max(to[x], from[x + dx]);
-                    });
-        for (i64 x = 0; x < width; ++x) {
-            const size_t at = size_t(y * width + x);
-            const double relative = lit[size_t(x)] > 0.0 ? spread[size_t(x)] / lit[size_t(x)] : 0.0;
-            noise[at] = float(rules_.gap_variances * relative) * grey[at] * grey[at];
-            beside[at] = brightest[size_t(x)] >= grey[at] ? 1.0f : 0.0f;
-        }
-    }
-
-    const NoisyPicture& picture_;
-    const ErrorRules& rules_;
-    PlaneOf<double> spread_{size};  // deviations, means of the channels
-    PlaneOf<double> lit_along_{size}, spread_along_{size};  // squares of grey and of those, over neighbours in the row
-};
 
 // One row's guesses at the truth: the mean of those neighbours whose brightness differs by no more than noise explains,
 // and of what the pixel's own samples agree upon.
@@ -236,7 +77,7 @@ class RowGuess {
 // Calls take(y, r, squares) for every row and guess, r = 0 the nearest.
 template <class Take>
 void each_row_of_squares(const Planes& planes, const ErrorRules& rules, ThreadPool& pool, Take&& take) {
-    pool.parallel_for(size_t(planes.height), ROWS, [&](size_t begin, size_t end, unsigned) {
+    pool.parallel_for(size_t(planes.height), ROWS_AT_ONCE, [&](size_t begin, size_t end, unsigned) {
         RowGuess guess(planes, rules);
         Row squares(size_t(planes.width));
         for (i64 y = i64(begin); y < i64(end); ++y) {
