@@ -36,7 +36,7 @@ NO_THRESHOLDS = {
     "luch/cuda/several.py": "1e-06",  # seconds
     "luch/denoise.py": "0.001",
     "luch/quality.py": "0.001",
-    "luch/render.py": "7e-07 4e-09 1e-06",
+    "luch/render.py": "2e-07 4e-09 1e-06",
     "luch/sky.py": "0.0004 0.0008",  # Preetham's fit
     "luch/spectrum.py": "0.0001 1e-09",  # units
     "addon/export/nodes/media.py": "5.670373e-08 1e-06",
