@@ -27,6 +27,10 @@ u64 add_samples(cpu::Film& film, u32 pixel, u32 channel, const Floats& values) {
     return refused[REFUSED_DATA];
 }
 
+// Of a picture: all processors, or one where it has fewer pixels than are worth more.
+unsigned threads_for(u64 pixels, u64 worth_more) { return pixels < worth_more ? 1 : 0; }
+constexpr u64 WORTH_READING = 65536, WORTH_ESTIMATING = 16384;
+
 }  // namespace
 
 cpu::FilmSpec read_film(const py::handle& film, const py::handle& origin) {
@@ -60,7 +64,7 @@ py::dict resolve_film(const cpu::Film& film) {
     }
     py::gil_scoped_release release;
     // Threads of its own: a renderer's may be busy with the next step. Small films are not worth any.
-    cpu::ThreadPool pool(u64{film.width()} * film.height() < 65536 ? 1 : 0);
+    cpu::ThreadPool pool(threads_for(u64{film.width()} * film.height(), WORTH_READING));
     film.resolve(out, pool);
     return passes;
 }
@@ -72,7 +76,7 @@ py::tuple film_deviations(const cpu::Film& film) {
     float *to_mean = mean.mutable_data(), *to_deviation = deviation.mutable_data();
     {
         py::gil_scoped_release release;
-        cpu::ThreadPool pool(u64{film.width()} * film.height() < 65536 ? 1 : 0);
+        cpu::ThreadPool pool(threads_for(u64{film.width()} * film.height(), WORTH_READING));
         before = film.deviations(to_mean, to_deviation, pool);
     }
     return py::make_tuple(mean, deviation, before);
@@ -109,9 +113,9 @@ cpu::NoisyPicture noisy_picture(const Floats& mean, const Floats& deviation, dou
     return {mean.shape(0), mean.shape(1), mean.data(), deviation.data(), share};
 }
 
-// threads 0: all processors, one where the picture is not worth more.
+// threads 0: as many as the picture is worth.
 unsigned threads_for(const cpu::NoisyPicture& picture, unsigned threads) {
-    return threads == 0 && picture.height * picture.width < 16384 ? 1 : threads;
+    return threads ? threads : threads_for(u64(picture.height * picture.width), WORTH_ESTIMATING);
 }
 
 // Of each guess at the truth, the nearest first: float64 (H, W).

@@ -45,7 +45,7 @@ void add_box(const T* row, i64 width, i64 radius, double* to) {
 // A picture's rows taken apart, in units of its brightest value: squares of floats then stay floats.
 class Planes {
  public:
-    // Both must outlive it.
+    // picture and rules must outlive it.
     Planes(const NoisyPicture& picture, const ErrorRules& rules, ThreadPool& pool);
 
     template <class Body>

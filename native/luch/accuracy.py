@@ -119,12 +119,12 @@ def _rules() -> dict[str, float]:
     }
 
 
-def relative_squares(mean: F32, deviation: F32, share: float) -> list[F64]:
+def relative_squares(mean: F32, deviation: F32, share: float, radius: int = GUIDE_RADIUS) -> list[F64]:
     """Squared deviations over what the truth may be, means of the channels, (H, W); 0 where nothing is known. Their
     mean is the relMSE.
 
     share: of the samples that the first part holds. One for each guess at the truth, from neighbours up to 1, 2, ...
-    GUIDE_RADIUS pixels away; the first is the best: the nearest neighbours were off by half as much as those two pixels
+    radius pixels away; the first is the best: the nearest neighbours were off by half as much as those two pixels
     away (twelve scenes). The truth is not known, and a pixel's own noise must not hide its error. So it is guessed: the
     mean of those neighbours whose brightness differs by no more than noise explains (Lee's sigma filter, 1983), and, as
     one more of them, of what the pixel's own samples agree upon: an edge keeps its two sides, a highlight counts by
@@ -138,7 +138,7 @@ def relative_squares(mean: F32, deviation: F32, share: float) -> list[F64]:
     """
     from luch._native import core  # not needed by those who only read numbers
 
-    return list(core.film.relative_squares(mean, deviation, share, _rules()))
+    return list(core.film.relative_squares(mean, deviation, share, _rules() | {"guide_radius": radius}))
 
 
 def estimate(mean: F32, deviation: F32, share: float = 0.5) -> Estimate | None:

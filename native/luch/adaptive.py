@@ -77,7 +77,8 @@ class Regions:
             place = np.where(there, own, 0)
             images = [np.where(there[..., None], image.reshape(-1, 3)[place], np.nan) for image in (mean, deviation)]
             mean_there, deviation_there = (image.astype(np.float32) for image in images)
-            squares.reshape(-1)[own[there]] = accuracy.relative_squares(mean_there, deviation_there, share)[0][there]
+            (nearest,) = accuracy.relative_squares(mean_there, deviation_there, share, radius=1)
+            squares.reshape(-1)[own[there]] = nearest[there]
         squares[~np.isfinite(squares)] = 0.0
         sums = np.bincount(self.of_pixel.ravel(), squares.ravel(), minlength=self.count)
         return np.asarray(counts * sums / np.maximum(self.pixels, 1.0))

@@ -168,6 +168,7 @@ def test_the_cores_sums_are_those_of_the_rule_spelled_out(share: float) -> None:
     assert len(found) == len(right) == accuracy.GUIDE_RADIUS
     for squares, wanted in zip(found, right, strict=True):
         np.testing.assert_allclose(squares, wanted, rtol=2e-5)
+    assert np.array_equal(accuracy.relative_squares(mean, deviation, share, radius=1), found[:1])
     estimated, wanted = accuracy.estimate(mean, deviation, share), error_oracle.estimate(mean, deviation, share)
     assert estimated is not None and estimated.statistics() == pytest.approx(wanted, rel=1e-5)
 
