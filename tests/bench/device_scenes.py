@@ -116,7 +116,7 @@ def luch(options: argparse.Namespace) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
         told = {"machine": device.describe(), "commit": commit(), "scenes": seconds}
         (options.out / "luch.json").write_text(json.dumps(told))
-    np.savez_compressed(options.out / "luch.npz", **kept)
+        np.savez_compressed(options.out / "luch.npz", **kept)
     return 0
 
 
@@ -169,7 +169,7 @@ def cycles(options: argparse.Namespace) -> int:
         bpy.data.images["Render Result"].save_render(str(options.out / f"{name}-{options.device}.exr"), scene=scene)
         seconds[name] = {"seconds": many - one, "fixed": one}
         print(options.device, name, seconds[name], flush=True)
-    (options.out / f"cycles-{options.device}.json").write_text(json.dumps(seconds))
+        (options.out / f"cycles-{options.device}.json").write_text(json.dumps(seconds))
     return 0
 
 

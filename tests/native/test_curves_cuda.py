@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from luch.cuda.plan import NEEDED_BY
+from luch.cuda.plan import CURVE_SHAPES, NEEDED_BY
 from luch.effects import effects_of
 from luch.render import render
 from luch.scene import Scene
@@ -39,7 +39,7 @@ def tangle(shape: str, build: Build = fibre) -> Scene:
     return scene_of(mesh, build, shape=shape, width=5.0, size=12, matrices=matrices, world=1.0, passes=["Combined"])
 
 
-# On fibers one shape: the kernel holds all three, and compiling it is most of the time.
+# On fibers one shape: each has kernels of its own, and compiling them is most of the time.
 @pytest.mark.parametrize(("shape", "build"), [
     ("RIBBON", fibre), ("RIBBON", cones), *(pytest.param(s, fibre, marks=pytest.mark.cuda) for s in SHAPES[1:]),
 ])  # fmt: skip
@@ -50,6 +50,7 @@ def test_hair_looks_as_on_the_cpu(place: str, shape: str, build: Build) -> None:
     assert ours.stats["device"].startswith("CUDA"), ours.stats["warnings"]
     assert ours.stats["kernel_plan"]["CURVES"] and ours.stats["kernel_plan"]["HAIR"]
     plan = ours.stats["kernel_plan"]
+    assert plan["CURVE_SHAPE"] == CURVE_SHAPES.index(shape), "no code of the other shapes"
     assert (plan["FIBRES"], plan["HAIR_CONES"]) == (build is fibre, build is cones), "no code of the other lobes"
     a, b = ours.passes["Combined"], cpu.passes["Combined"]
     if place == FIBERS:

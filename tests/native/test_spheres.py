@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from luch.scene import Attribute, Material, Mesh, Object, Scene
 from luch.shader import ProgramBuilder
 from numpy.typing import NDArray
 from support.accel_meshes import icosphere, random_rays
+from support.devices import both, check_equal
 from support.effects import closure, program
 from support.from_above import Build, add_ball, scene_of, three_places, white
 
@@ -75,6 +77,17 @@ def test_every_structure_gives_the_picture_of_brute_force(kind: str, truth: dict
     assert result.stats["spheres"] == 700
     for name, pixels in truth.items():
         assert np.array_equal(result.passes[name].view(np.uint32), pixels.view(np.uint32)), name
+
+
+def test_kernels_draw_the_cpus_spheres_and_have_no_code_for_them_without(place: str) -> None:
+    scene = mixed()
+    cpu, _, ours, stats = both(scene)
+    assert stats["kernel_plan"]["SPHERES"]
+    check_equal("Combined", cpu["Combined"], ours["Combined"], place)
+    bare = replace(scene, meshes=[replace(mesh, spheres=None) for mesh in scene.meshes])
+    cpu, _, ours, stats = both(bare)
+    assert not stats["kernel_plan"]["SPHERES"]
+    check_equal("Combined", cpu["Combined"], ours["Combined"], place)
 
 
 def test_in_double_precision_the_picture_holds_the_same_surfaces(truth: dict[str, F32]) -> None:

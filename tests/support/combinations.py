@@ -7,9 +7,22 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from luch.scene import Instances, Light, Material, Mesh, Object, Scene
+from luch.scene import (
+    CameraMotion,
+    InstanceMotion,
+    Instances,
+    Light,
+    Material,
+    Medium,
+    Mesh,
+    Object,
+    Scene,
+    Shutter,
+    World,
+)
 from luch.shader import ProgramBuilder
 
+from support.accel_meshes import icosphere
 from support.effects import closure, principled, program
 from support.everything import everything, quad
 from support.hair import fibre, strands
@@ -28,7 +41,8 @@ def _coat(scene: Scene) -> None:
 
 
 def _sheen(scene: Scene) -> None:
-    _material(scene, 2, lambda b: closure(b, "CLOSURE_SHEEN", {"color": (0.8, 0.7, 0.6), "roughness": 0.5}))
+    inputs = {"color": (0.8, 0.7, 0.6), "roughness": 0.5}
+    _show(scene, quad("Velvet", 0.4, 1.2), lambda b: closure(b, "CLOSURE_SHEEN", inputs))
 
 
 def _glass(scene: Scene) -> None:
@@ -97,6 +111,7 @@ def _show(scene: Scene, mesh: Mesh, build: Callable[[ProgramBuilder], None]) -> 
         np.append(old.random, np.float32(0.3)),
         np.concatenate([old.generated, np.zeros((1, 3), np.float32)]),
         np.concatenate([old.uv, np.zeros((1, 2), np.float32)]),
+        motion=old.motion,
     )
 
 
@@ -115,6 +130,44 @@ def _hair_shading(scene: Scene) -> None:
 
 def _round_hair(scene: Scene) -> None:
     scene.settings.curve_shape = "THICK"
+
+
+def _cloud(scene: Scene) -> None:
+    none = np.zeros((0, 3), np.float32)
+    dust = np.array([[-0.8, 0.4, 0.7, 0.2], [0.3, -0.6, 0.9, 0.15], [0.9, 0.8, 0.5, 0.1]], np.float32)
+    _show(scene, Mesh("Dust", none, none.astype(np.uint32), np.zeros(0, np.uint16), spheres=dust), _chalk)
+
+
+def _skin(scene: Scene) -> None:
+    positions, triangles = icosphere(1)
+    ball = Mesh(
+        "Wax",
+        positions * np.float32(0.4) + np.float32([0.9, -0.9, 0.6]),
+        triangles,
+        np.zeros(len(triangles), np.uint16),
+    )
+    inputs = {"color": (0.8, 0.5, 0.4), "radius": 0.1, "ior": 1.4, "alpha": 1.0, "anisotropy": 0.0}
+    _show(scene, ball, lambda b: closure(b, "CLOSURE_SUBSURFACE", inputs, params=(1, 0)))
+
+
+def _mist(scene: Scene) -> None:
+    """All around; a world that is there keeps its light."""
+    world = scene.world or World("Night", program(None))
+    scene.world = replace(world, volume=Medium((0.05, 0.04, 0.03)))
+
+
+def _moving_object(scene: Scene) -> None:
+    assert scene.instances is not None
+    ends = [scene.instances.matrix[1].copy() for _ in range(2)]
+    ends[1][0, 3] += 0.3
+    motion = InstanceMotion(np.array([1], np.uint32), np.array([2], np.uint32), np.stack(ends))
+    scene.instances, scene.shutter = replace(scene.instances, motion=motion), Shutter()
+
+
+def _moving_camera(scene: Scene) -> None:
+    ends = [scene.camera.matrix.copy() for _ in range(2)]
+    ends[1][1, 3] += 0.1
+    scene.camera, scene.shutter = replace(scene.camera, motion=CameraMotion(np.stack(ends))), Shutter()
 
 
 EFFECTS: dict[str, Callable[[Scene], None]] = {
@@ -136,6 +189,11 @@ EFFECTS: dict[str, Callable[[Scene], None]] = {
     "hair": _hair,
     "hair shading": _hair_shading,
     "round hair": _round_hair,
+    "point cloud": _cloud,
+    "subsurface": _skin,
+    "volume": _mist,
+    "moving object": _moving_object,
+    "moving camera": _moving_camera,
 }
 
 

@@ -7,6 +7,12 @@
 #ifndef LUCH_PLAN_CURVES
 #define LUCH_PLAN_CURVES !LUCH_CUDA  // kernels that trace are compiled again for scenes with hair
 #endif
+#ifndef LUCH_PLAN_CURVE_SHAPE
+#define LUCH_PLAN_CURVE_SHAPE 3
+#endif
+#ifndef LUCH_PLAN_SPHERES
+#define LUCH_PLAN_SPHERES 1
+#endif
 #ifndef LUCH_PLAN_HAIR
 #define LUCH_PLAN_HAIR 1
 #endif
@@ -141,6 +147,9 @@
 namespace luch::plan {
 
 inline constexpr bool CURVES = LUCH_PLAN_CURVES;  // primitives that are pieces of hair
+inline constexpr u32 CURVE_SHAPE = LUCH_PLAN_CURVE_SHAPE;  // the one CurveShape (geometry/curve.h) that there is
+inline constexpr u32 ANY_CURVE_SHAPE = 3;                  // it is asked at run time
+inline constexpr bool SPHERES = LUCH_PLAN_SPHERES;         // primitives that are points of point clouds
 inline constexpr bool FIBRES = LUCH_PLAN_HAIR && LUCH_PLAN_FIBRES;          // lobes of Principled Hair
 inline constexpr bool HAIR_CONES = LUCH_PLAN_HAIR && LUCH_PLAN_HAIR_CONES;  // lobes of the Hair BSDF node
 inline constexpr bool HAIR = FIBRES || HAIR_CONES;

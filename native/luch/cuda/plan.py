@@ -19,6 +19,7 @@ NEEDED_BY: dict[str, tuple[str, ...]] = {
     "THIN_FILM": ("thin film",),
     "SHEEN": ("sheen",),
     "CURVES": ("hair",),
+    "SPHERES": ("point clouds",),
     "HAIR": ("hair shading",),
     "ROUND_LAMPS": ("point lamps", "spot lamps"),
     "AREA_LAMPS": ("area lamps",),
@@ -83,6 +84,9 @@ POSSIBLE = {
 }
 MOST_LOBES = 12  # of plan.h, where general code keeps the likeliest
 SAMPLER = "SAMPLER"  # define -> SamplerFamily
+CURVE_SHAPE = "CURVE_SHAPE"  # define -> CurveShape of geometry/curve.h
+CURVE_SHAPES = ("RIBBON", "THICK", "THICK_LINEAR")
+ANY_CURVE_SHAPE = len(CURVE_SHAPES)
 
 
 def plan_of(scene: Scene, operations: set[str], facts: Mapping[str, Any]) -> dict[str, bool | int]:
@@ -91,13 +95,15 @@ def plan_of(scene: Scene, operations: set[str], facts: Mapping[str, Any]) -> dic
     """
     sampler = {SAMPLER: NAMES.index(scene.settings.sampler)}
     if ALL in scene.settings.force_effects:
-        return dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD, *POSSIBLE], True) | {"MOST_LOBES": MOST_LOBES} | sampler
+        every = dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD, *POSSIBLE], True)
+        return every | {"MOST_LOBES": MOST_LOBES, CURVE_SHAPE: ANY_CURVE_SHAPE} | sampler
     effects, possible = effects_of(scene), possible_in(scene)
     plan: dict[str, bool | int] = {
         define: any(effects[name].on for name in names) for define, names in NEEDED_BY.items()
     }
     plan |= {define: name in possible.needs for define, name in POSSIBLE.items()}
     plan["MOST_LOBES"] = min(possible.most_lobes, MOST_LOBES)
+    plan[CURVE_SHAPE] = CURVE_SHAPES.index(scene.settings.curve_shape) if plan["CURVES"] else ANY_CURVE_SHAPE
     plan |= sampler
     plan |= {define: bool(facts[name]) for define, name in TOLD.items()}
     plan |= {define: any(name in operations for name in names) for define, names in MADE_BY.items()}
@@ -108,6 +114,11 @@ def sampler_flags(scene: Scene) -> tuple[str, ...]:
     """For kernels that serve all scenes, where theirs is not the one that those are compiled with."""
     family = NAMES.index(scene.settings.sampler)
     return tuple(flags({SAMPLER: family})) if family else ()
+
+
+def curve_flags(shape: str) -> tuple[str, ...]:
+    """For kernels that trace hair of that Settings.curve_shape; "": there is none, and those for all scenes serve."""
+    return tuple(flags({"CURVES": True, CURVE_SHAPE: CURVE_SHAPES.index(shape)})) if shape else ()
 
 
 def flags(plan: Mapping[str, bool | int]) -> list[str]:

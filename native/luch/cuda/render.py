@@ -206,8 +206,8 @@ class DeviceRenderer(HostFilm):
         self._arrays = DeviceCopy(blocks, links, left_images)
         self.warnings = _told_images([len(blocks[number][1]) for number in left_images])
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
-                                   facts["world_apart"], left, depth, facts["trees_move"], facts["curves"],
-                                   self._timed)  # fmt: skip
+                                   facts["world_apart"], left, depth, facts["trees_move"],
+                                   self._scene.settings.curve_shape if facts["curves"] else "", self._timed)  # fmt: skip
         return facts, blocks
 
     def _images_to_leave(self, blocks: Blocks, tree_blocks: Blocks, left: Left) -> set[int]:

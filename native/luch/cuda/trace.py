@@ -11,11 +11,11 @@ import numpy as np
 from luch.cuda.builder import MAX_DEPTH, build_cwbvh_of
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, Kernel, cupy
+from luch.cuda.plan import curve_flags
 from luch.cuda.upload import Blocks, DeviceCopy, Links
 
 BLOCK = 128  # RAY_BLOCK of rays/structure.cuh
 MOVING = ("-DLUCH_PLAN_MOTION=1",)
-CURVES = ("-DLUCH_PLAN_CURVES=1",)
 TIMED_RAYS = ("-DLUCH_TIMED_RAYS=1",)
 HIT = np.dtype([("t", "<f4"), ("prim", "<i4"), ("instance", "<i4"), ("u", "<f4"), ("v", "<f4")])  # luch::Hit; -1: NONE
 
@@ -51,16 +51,16 @@ class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
     def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, world_apart: bool, left: Left = (),
-                 depth: int = 0, moves: bool = False, curves: bool = False, timed: bool = False) -> None:  # fmt: skip
+                 depth: int = 0, moves: bool = False, curves: str = "", timed: bool = False) -> None:  # fmt: skip
         """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for.
 
         world_apart: one group is all of the scene, or all that stands still where the rest moves; left: groups that the
-        device builds, if any; depth: of the trees that were built; moves: something in them does; curves: some group
-        holds hair; timed: `ticks` of closest() and any() are written. Kernels lack the code of what is not asked for.
-        May raise TreesTooDeep.
+        device builds, if any; depth: of the trees that were built; moves: something in them does; curves: the
+        Settings.curve_shape of the hair that some group holds, "" without; timed: `ticks` of closest() and any() are
+        written. Kernels lack the code of what is not asked for. May raise TreesTooDeep.
         """
         self._trees = upload_trees(blocks, links, left, depth)
-        self._module = load(f"TRACE_{kind}", precision, MOVING * moves + CURVES * curves + TIMED_RAYS * timed)
+        self._module = load(f"TRACE_{kind}", precision, MOVING * moves + curve_flags(curves) + TIMED_RAYS * timed)
         one = "_one" if world_apart and kind == "CWBVH" else ""
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
         # What moves comes after what stands still, which is found as if nothing moved.

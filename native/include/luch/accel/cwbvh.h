@@ -141,7 +141,8 @@ LUCH_FN bool test_leaf(const LeafPrimitive& p, const CurveSet& curves, const Pri
         if (!line_may_touch({vec3_of(p.a), vec3_of(p.b), p.c[0]}, ray.origin, ray.direction)) return false;
         return test_piece<P>(curves, p.ref, ray.origin, ray.direction, t_min, t_max, hit);
     }
-    if (p.kind == LEAF_TRIANGLE) return ray.triangle(vec3_of(p.a), vec3_of(p.b), vec3_of(p.c), t_min, t_max, hit);
+    if (!plan::SPHERES || p.kind == LEAF_TRIANGLE)
+        return ray.triangle(vec3_of(p.a), vec3_of(p.b), vec3_of(p.c), t_min, t_max, hit);
     hit->u = hit->v = 0.0f;
     return intersect_sphere<P>(ray.origin, ray.direction, {vec3_of(p.a), p.b[0]}, t_min, t_max, &hit->t);
 }

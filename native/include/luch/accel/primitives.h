@@ -114,12 +114,12 @@ LUCH_FN_APART bool test_moving_piece(const CurveSet& set, const float* later, fl
 template <Precision P, class Count>
 LUCH_FN bool test_primitive(const Primitives& all, const PrimitiveRay<P>& ray, u32 ref, float t_min, float t_max,
                             TriangleHit* hit, Count& count) {
-    if (ref < all.triangle_count) {
+    if (!(plan::SPHERES || plan::CURVES) || ref < all.triangle_count) {
         const float* p = all.corners + 9 * u64(ref);
         count.primitive(36);
         return ray.triangle(vec3_of(p), vec3_of(p + 3), vec3_of(p + 6), t_min, t_max, hit);
     }
-    if (is_piece(all, ref)) {
+    if (plan::CURVES && (!plan::SPHERES || is_piece(all, ref))) {
         count.primitive(68);
         return test_piece<P>(all.curves, piece_of(all, ref), ray.origin, ray.direction, t_min, t_max, hit);
     }

@@ -7,6 +7,7 @@
 #include "luch/geometry/precision.h"
 #include "luch/geometry/ray.h"
 #include "luch/math/bounds.h"
+#include "luch/plan.h"
 
 namespace luch {
 
@@ -15,6 +16,11 @@ enum class CurveShape : u32 {
     THICK,         // round, open at both ends; only the outside is there
     THICK_LINEAR,  // straight cones between points, balls at the joints and ends; only the outside is there
 };
+
+// What curves look like; told: as the scene says it.
+LUCH_FN CurveShape look_of(CurveShape told) {
+    return plan::CURVE_SHAPE == plan::ANY_CURVE_SHAPE ? told : CurveShape(plan::CURVE_SHAPE);
+}
 
 enum SegmentFlag : u32 { SEGMENT_HAS_BEFORE = 1, SEGMENT_HAS_AFTER = 2 };
 
@@ -99,7 +105,7 @@ LUCH_FN float radius_of(const CurveSegment& s, const CurveWeights& w) {
 // Along the curve at u, not unit; where the curve stands still, along its chord.
 LUCH_FN Vec3 curve_tangent(const CurveSegment& s, CurveShape shape, float u) {
     Vec3 chord = s.k[2].p - s.k[1].p;
-    if (shape == CurveShape::THICK_LINEAR) return chord;
+    if (look_of(shape) == CurveShape::THICK_LINEAR) return chord;
     Vec3 t = place_of(s, tangent_weights(u));
     return length_squared(t) > 0.0f ? t : chord;
 }
@@ -131,11 +137,11 @@ LUCH_FN float distance_to_line(Vec3 p, Vec3 a, Vec3 b) {
 LUCH_FN_SLOW Capsule piece_capsule(const CurveSet& set, u32 piece) {
     CurveSegment s = segment_of_piece(set, piece);
     PieceRange range = range_of_piece(set.log2_pieces, piece);
-    if (set.shape == CurveShape::THICK_LINEAR)
+    if (look_of(set.shape) == CurveShape::THICK_LINEAR)
         return widened({s.k[1].p, s.k[2].p, max_f(s.k[1].radius, s.k[2].radius)}, s);
     CurveWeights from = curve_weights(range.from), to = curve_weights(range.to);
     Capsule c = {place_of(s, from), place_of(s, to), max_f(radius_of(s, from), radius_of(s, to))};
-    if (set.shape == CurveShape::THICK) {
+    if (look_of(set.shape) == CurveShape::THICK) {
         // Bezier's points of the piece hold it (Bezier 1972); the inner two stray from the chord.
         CurveWeights t0 = tangent_weights(range.from), t1 = tangent_weights(range.to);
         float third = (range.to - range.from) * (1.0f / 3.0f);
@@ -167,7 +173,7 @@ LUCH_FN bool piece_is_finite(const CurveSet& set, u32 piece) {
 LUCH_FN bool piece_has_radius(const CurveSet& set, u32 piece) {
     CurveSegment s = segment_of_piece(set, piece);
     PieceRange range = range_of_piece(set.log2_pieces, piece);
-    bool cubic = set.shape != CurveShape::THICK_LINEAR;
+    bool cubic = look_of(set.shape) != CurveShape::THICK_LINEAR;
     float from = cubic ? radius_of(s, curve_weights(range.from)) : s.k[1].radius;
     float to = cubic ? radius_of(s, curve_weights(range.to)) : s.k[2].radius;
     return max_f(from, to) > 0.0f;

@@ -279,10 +279,11 @@ LUCH_FN bool intersect_linear(const CurveSegment& segment, const CurveRay<F>& ra
 template <class F>
 LUCH_FN bool intersect_piece_of(const CurveSegment& s, const CurveSet& set, u32 piece, const CurveRay<F>& ray,
                                 float t_min, float t_max, TriangleHit* hit) {
-    if (set.shape == CurveShape::THICK_LINEAR) return intersect_linear(s, ray, t_min, t_max, hit);
+    CurveShape look = look_of(set.shape);
+    if (look == CurveShape::THICK_LINEAR) return intersect_linear(s, ray, t_min, t_max, hit);
     PieceRange range = range_of_piece(set.log2_pieces, piece);
-    return set.shape == CurveShape::RIBBON ? intersect_ribbon(s, range, ray, t_min, t_max, hit)
-                                           : intersect_thick(s, range, ray, t_min, t_max, hit);
+    return look == CurveShape::RIBBON ? intersect_ribbon(s, range, ray, t_min, t_max, hit)
+                                      : intersect_thick(s, range, ray, t_min, t_max, hit);
 }
 template <class F>
 LUCH_FN bool intersect_piece(const CurveSet& set, u32 piece, const CurveRay<F>& ray, float t_min, float t_max,

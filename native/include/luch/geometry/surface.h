@@ -114,8 +114,9 @@ LUCH_FN Vec3 entered_cylinder_at(Vec3 center, Vec3 tangent, float radius, Vec3 o
 }
 
 // A point on a curve's piece. The normal that is shaded is that of the round curve, on a ribbon too.
-LUCH_FN_SLOW SurfacePoint curve_point(const CurveSegment& s, CurveShape shape, const Hit& hit, const Ray& ray,
+LUCH_FN_SLOW SurfacePoint curve_point(const CurveSegment& s, CurveShape told, const Hit& hit, const Ray& ray,
                                       const Affine& to_world, const Affine& to_object) {
+    CurveShape shape = look_of(told);
     Vec3 origin = transform_point(to_object, ray.origin), direction = transform_direction(to_object, ray.direction);
     double t = double(hit.t);
     Vec3 p = {float(double(origin.x) + t * double(direction.x)), float(double(origin.y) + t * double(direction.y)),

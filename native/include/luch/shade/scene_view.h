@@ -148,9 +148,13 @@ LUCH_FN u32 first_piece(const MeshView& mesh) { return mesh.triangle_count + mes
 LUCH_FN u32 primitive_count(const SceneView& scene, const MeshView& mesh) {
     return first_piece(mesh) + (mesh.segment_count << scene.log2_pieces);
 }
-LUCH_FN bool is_triangle(const MeshView& mesh, u32 prim) { return prim < mesh.triangle_count; }
+LUCH_FN bool is_triangle(const MeshView& mesh, u32 prim) {
+    return !(plan::SPHERES || plan::CURVES) || prim < mesh.triangle_count;
+}
 LUCH_FN bool is_curve(const MeshView& mesh, u32 prim) { return plan::CURVES && prim >= first_piece(mesh); }
-LUCH_FN bool is_sphere(const MeshView& mesh, u32 prim) { return !is_triangle(mesh, prim) && !is_curve(mesh, prim); }
+LUCH_FN bool is_sphere(const MeshView& mesh, u32 prim) {
+    return plan::SPHERES && !is_triangle(mesh, prim) && !is_curve(mesh, prim);
+}
 // Centre and radius of a primitive that is a sphere.
 LUCH_FN const float* sphere_at(const SceneView& scene, const MeshView& mesh, u32 prim) {
     return scene.spheres + 4 * (u64(mesh.first_sphere) + (prim - mesh.triangle_count));

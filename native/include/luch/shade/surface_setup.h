@@ -71,7 +71,7 @@ LUCH_FN void setup_surface_lane(const SceneView& scene, const LaneInputs& in, Sh
     if (!round) t = triangle_at(scene, instance, in.prim, in.time);
     Vec3 ng = round ? in.radial : world_face_normal(instance, t);
     // A ribbon is turned to the ray, and only shaded as if it were round.
-    bool ribbon = is_curve(mesh, in.prim) && scene.curve_shape == CurveShape::RIBBON;
+    bool ribbon = is_curve(mesh, in.prim) && look_of(scene.curve_shape) == CurveShape::RIBBON;
     if (ribbon) ng = in.to_viewer;
     bool back = dot(ng, in.to_viewer) < 0.0f;
     if (back) ng = -ng;
