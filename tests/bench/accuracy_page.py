@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 from support.checkout import commit
+from support.pages import replace_between
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "out" / "bench" / "accuracy.json"
 PAGE = ROOT / "docs" / "accuracy.md"
-BEGIN, END = "<!-- table: build.py bench accuracy -->", "<!-- end of table -->"
 IN_BAND = 0.8, 1.25  # A2
 MET = 0.7, 1.1  # A4, of errors
 NEAR = np.log(0.8), np.log(1.2)  # A6
@@ -222,14 +222,7 @@ def write_page_from(files: list[Path]) -> None:
         rows += [Row(**row) for row in told["rows"]]
     for _, rows in groups.values():
         rows.sort(key=lambda row: row.scene)
-    _write_page("\n\n".join(report(rows, what) for what, rows in groups.values()))
-
-
-def _write_page(tables: str) -> None:
-    """Puts them between the page's marks."""
-    page = PAGE.read_text(encoding="utf-8")
-    before, after = page.partition(BEGIN)[0], page.partition(END)[2]
-    PAGE.write_text(f"{before}{BEGIN}\n{tables}\n{END}{after}", encoding="utf-8")
+    replace_between(PAGE, "accuracy", "\n\n".join(report(rows, what) for what, rows in groups.values()))
 
 
 class Kept:
@@ -266,7 +259,7 @@ class Kept:
 
     def write_page(self) -> None:
         """Puts the tables into docs."""
-        _write_page(report(self.rows, self.what))
+        replace_between(PAGE, "accuracy", report(self.rows, self.what))
 
 
 def _code() -> str:

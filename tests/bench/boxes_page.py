@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from support.pages import replace_between
 from support.races import products_ratio
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "accuracy.md"
-BEGIN, END = "<!-- boxes: begin -->", "<!-- boxes: end -->"
 MOST_NOISE = 0.05  # of a converged picture, over the relMSE that is held against it
 HEADINGS = ["box", "engine", "relMSE", "brightness %", "CPU ms a sample", "relMSE x s", "over Luch's"]
 
@@ -98,6 +98,4 @@ def read(files: list[Path]) -> tuple[list[Row], dict[str, Any]]:
 
 def write(rows: list[Row], what: dict[str, Any]) -> None:
     """Puts them between the page's marks. Raises ValueError if it has none."""
-    page = PAGE.read_text(encoding="utf-8")
-    begin, end = page.index(BEGIN) + len(BEGIN), page.index(END)
-    PAGE.write_text(f"{page[:begin]}\n{report(rows, what)}\n{page[end:]}", encoding="utf-8")
+    replace_between(PAGE, "boxes", report(rows, what))

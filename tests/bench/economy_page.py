@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from support.pages import replace_between
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "effects.md"
 DEVICES = ("CPU", "CUDA")
@@ -34,10 +36,7 @@ def write() -> None:
             names = list(dict.fromkeys(name for own in rows.values() for name in own))
             if names:
                 parts += [title.format(scene), "\n".join(_table(kind, names, rows))]
-    text = PAGE.read_text(encoding="utf-8")
-    begin_mark, end_mark = "<!-- economy: begin -->", "<!-- economy: end -->"
-    begin, end = text.index(begin_mark) + len(begin_mark), text.index(end_mark)
-    PAGE.write_text(text[:begin] + "\n" + "\n\n".join(parts) + "\n" + text[end:], encoding="utf-8")
+    replace_between(PAGE, "economy", "\n\n".join(parts))
 
 
 def _commits(record: dict[str, Any]) -> set[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import matplotlib as mpl
 from luch.bench.rays import KINDS
+from support.pages import replace_between
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -24,9 +25,8 @@ CUDA_RECORD = ROOT / "tests" / "bench" / "records" / "rays-cuda.json"  # by `pyt
 def write_page(rows: list[dict[str, Any]], means: dict[str, dict[str, float]]) -> None:
     """The CPU's race. Raises ValueError if the page has no marks for it."""
     columns = ["build, ms/Mtri", "bytes/triangle", "nodes, tests of a diffuse ray"]
-    _replace(
-        "race", [_where(), *_tables(rows, columns, _lines_of_race), _means(means), "![Mrays/s by structure](rays.png)"]
-    )
+    parts = [_where(), *_tables(rows, columns, _lines_of_race), _means(means), "![Mrays/s by structure](rays.png)"]
+    replace_between(PAGE, "race", "\n\n".join(parts))
     _plot(rows)
 
 
@@ -46,14 +46,7 @@ def write_cuda_part() -> None:
                    f"{one['nodes']:.1f}, {one['primitives']:.1f}", f"{one['bytes_per_triangle']:.0f}"]  # fmt: skip
 
     columns = ["registers", "occupancy", "nodes, tests of a diffuse ray", "bytes/triangle"]
-    _replace("cuda", [where, *_tables(rows, columns, lines_of)])
-
-
-def _replace(name: str, parts: list[str]) -> None:
-    begin_mark, end_mark = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    text = PAGE.read_text(encoding="utf-8")
-    begin, end = text.index(begin_mark) + len(begin_mark), text.index(end_mark)
-    PAGE.write_text(text[:begin] + "\n" + "\n\n".join(parts) + "\n" + text[end:], encoding="utf-8")
+    replace_between(PAGE, "cuda", "\n\n".join([where, *_tables(rows, columns, lines_of)]))
 
 
 def _where() -> str:

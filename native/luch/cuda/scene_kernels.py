@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,27 +25,40 @@ def structure_flags(kind: str) -> list[str]:
     return [f"-DLUCH_STRUCTURE={name}", f"-DLUCH_STRUCTURE_HEADER=<luch/accel/{kind.lower()}.h>"]
 
 
+class Sources(NamedTuple):
+    """What a scene's own kernels are compiled from."""
+
+    programs: str  # text of luch_scene_programs.cuh
+    flags: list[str]  # beside those of the precision
+    plan: dict[str, bool | int]  # LUCH_PLAN_... by name
+    operations: set[str]  # that its programs hold
+
+
+def sources_of(facts: dict[str, Any], blocks: list[tuple[str, Any]], scene: Scene) -> Sources:
+    """facts, blocks: core.render.Renderer.device_facts and its RenderTask's blocks."""
+    arrays = dict(blocks)
+    programs = [Linked(*row) for row in facts["programs"]]
+    instructions = np.frombuffer(arrays["instructions"], INSTRUCTION)
+    operands = np.frombuffer(arrays["operands"], np.uint32)
+    held = operations(programs, instructions)
+    plan = plans.plan_of(scene, held, facts)
+    flags = [
+        "-DLUCH_SCENE_PROGRAMS",
+        f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
+        *structure_flags(facts["structure"]),
+        *plans.flags(plan),
+    ]
+    return Sources(source(programs, facts["materials"], instructions, operands), flags, plan, held)
+
+
 class SceneKernels:
     """``kernel(name)`` is the best that is there at the moment; asked anew at every wave."""
 
     def __init__(self, facts: dict[str, Any], blocks: list[tuple[str, Any]], scene: Scene) -> None:
-        """facts, blocks: core.render.Renderer.device_facts and its RenderTask's blocks."""
-        precision = scene.settings.precision
-        arrays = dict(blocks)
-        programs = [Linked(*row) for row in facts["programs"]]
-        instructions = np.frombuffer(arrays["instructions"], INSTRUCTION)
-        operands = np.frombuffer(arrays["operands"], np.uint32)
-        self._text = source(programs, facts["materials"], instructions, operands)
-        self._flags = [
-            "-DLUCH_SCENE_PROGRAMS",
-            f"-DLUCH_TRANSPARENT={int(facts['transparent'])}",
-            *structure_flags(facts["structure"]),
-        ]
+        """As sources_of()."""
+        self._text, self._flags, self.plan, self._operations = sources_of(facts, blocks, scene)
         self._view = kind_of_view(scene)
-        self._operations = operations(programs, instructions)
-        self.plan = plans.plan_of(scene, self._operations, facts)
-        self._flags += plans.flags(self.plan)
-        self._precision = precision
+        self._precision = scene.settings.precision
         self._module: Module | None = None
         self._under_way: compiler.Compilation | None = None
         self.compile_seconds = 0.0
