@@ -75,6 +75,10 @@ class Kept:
         """Scene.origin of the renderer that is kept."""
         return self._held.scene.origin if self._held else None
 
+    def serves(self, scene: Scene) -> bool:
+        """Whether what is held, if anything, can draw this scene as it is: nothing would be built anew."""
+        return self._scene is None or _alike(scene, self._scene, _VIEW, _FREE)
+
     def renderer_for(self, scene: Scene, traced: Scene, make: Maker) -> Prepared:
         """scene: as the caller has it; traced: what is to be rendered of it; make: for a new renderer."""
         held = self._held
@@ -107,7 +111,7 @@ class Kept:
         if distance > 0.0:
             self._reach = float(held.renderer.origin_reach())
         if distance > self._reach * (HURRIED if self.hurried else 1.0):
-            if not _room_for_both(traced):
+            if not room_for_both(traced):
                 self.drop()
             return None
         held.scene, self._scene = here, scene
@@ -152,7 +156,7 @@ def _alike(a: Scene, b: Scene, but: set[str], settings_but: set[str]) -> bool:
 def _shares(held: Prepared, traced: Scene) -> bool:
     """Whether another renderer may take its structures over: on the CPU, while the camera stands still."""
     stands = same(held.scene.camera, traced.camera)
-    return stands and hasattr(held.renderer, "take_structures") and _room_for_both(traced)
+    return stands and hasattr(held.renderer, "take_structures") and room_for_both(traced)
 
 
 def _reshaded(held: Prepared, scene: Scene, traced: Scene, make: Maker) -> Prepared:
@@ -163,7 +167,7 @@ def _reshaded(held: Prepared, scene: Scene, traced: Scene, make: Maker) -> Prepa
     return Prepared(renderer, here, warnings, False, effects_of(scene).as_dict())
 
 
-def _room_for_both(scene: Scene) -> bool:
-    """GPUs have little memory, and build quickly."""
+def room_for_both(scene: Scene) -> bool:
+    """Whether what one renderer holds may stay while another is made. GPUs have little memory, and build quickly."""
     structures = 2.0  # as large as what they hold, or smaller
     return scene.settings.device == "CPU" and (1.0 + structures) * scene_bytes(scene) < available_bytes()

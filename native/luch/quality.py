@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from luch.accuracy import percent
 from luch.identity import identity_of
+from luch.kept import Kept
 from luch.report import files
 from luch.report.plan import EXACT, Variant, exact_settings
 from luch.report.results import Report, Row
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 TAKES_NOTHING = "REFERENCE"  # the step that allows no bias at all
 PILOT_SHARE = 0.1  # of the seconds that the render is foretold to take
-LEAST_PILOT, MOST_PILOT = 1.0, 30.0  # seconds; less tells nothing, more is not needed
+LEAST_PILOT, MOST_PILOT = 0.4, 30.0  # seconds; less tells nothing, more is not needed
 PILOT_GROWS = 4.0  # times as long as the look before: a short one may foretell five times too much
 PATIENCE = 4.0  # the first look at a scene may take so many times LEAST_PILOT where a busy machine needs it
 SOONER = 0.85  # of the time as the scene is set: a choice that gains less is not worth other settings
@@ -107,11 +108,16 @@ def _end(row: Row, error: float) -> dict[str, Any]:
     return {"error_limit": math.sqrt(error * error - _bias(row)), "samples": UNLIMITED_SAMPLES}
 
 
-def pilot(scene: Scene, step: str, watch: Callable[[Told], bool] | None = None) -> Choice:
-    """By a short report, if the render is going to be long enough to be worth one. Raises Cancelled when watch says no."""
+def pilot(scene: Scene, step: str, watch: Callable[[Told], bool] | None = None, kept: Kept | None = None) -> Choice:
+    """By a short report, if the render is going to be long enough to be worth one. Raises Cancelled when watch says no.
+
+    kept: holds afterwards what was built for it, where there is room.
+    """
+    kept = kept or Kept()
     exact = exact_settings(scene.settings)
     plain = as_set(step, exact if step == TAKES_NOTHING else None)
-    quick = Session(scene, LEAST_PILOT, watch, only=lambda variant: variant.rank == 0, rounds=2, patience=PATIENCE)
+    quick = Session(scene, LEAST_PILOT, watch, only=lambda variant: variant.rank == 0, rounds=2, patience=PATIENCE,
+                    kept=kept)  # fmt: skip
     try:
         first = quick.run()
     except Cancelled:
@@ -126,7 +132,7 @@ def pilot(scene: Scene, step: str, watch: Callable[[Told], bool] | None = None) 
         seconds = min(MOST_PILOT - spent, PILOT_SHARE * found.seconds - spent, PILOT_GROWS * last)
         if seconds < last:
             break
-        session = Session(scene, seconds, watch, only=_worth_trying)
+        session = Session(scene, seconds, watch, only=_worth_trying, kept=kept)
         try:
             report = session.run()
         except Cancelled:
@@ -150,19 +156,20 @@ def rendered(scene: Scene, render: Render, progress: Watch | None) -> Result:
     if settings.quality not in STEPS:
         raise ValueError(f"Settings: quality is {settings.quality!r}; it can be {CUSTOM}, {', '.join(STEPS)}.")
     start = time.perf_counter()
+    kept = Kept()
     report, warnings = _read(settings.quality_report, scene) if settings.quality_report else (None, [])
     try:
         if report is not None:
             choice = choose(report, settings.quality)
         else:
-            choice = pilot(scene, settings.quality, _told_on(progress))
+            choice = pilot(scene, settings.quality, _told_on(progress), kept)
     except Cancelled:  # the render ends at its first question
         choice = as_set(settings.quality)
     spent = time.perf_counter() - start
     changed = replace(settings, quality=CUSTOM, **choice.settings)
     if changed.time_limit > 0.0:
         changed.time_limit = max(1e-3, changed.time_limit - spent)
-    result = render(replace(scene, settings=changed), progress=progress)
+    result = render(replace(scene, settings=changed), progress=progress, kept=kept)
     result.stats["quality"] = {"step": settings.quality, "choice": choice.name, "settings": choice.settings,
                                "reason": choice.reason, "pilot_seconds": spent}  # fmt: skip
     result.stats["total_seconds"] += spent

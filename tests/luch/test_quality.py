@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import denoise, quality, record
+from luch._native import core
 from luch.identity import identity_of
 from luch.render import render
 from luch.report.files import write
@@ -140,12 +141,12 @@ def test_a_step_that_there_is_not_is_told() -> None:
 
 @pytest.mark.parametrize(
     ("foretold", "looks"),
-    [((200.0, 30.0), [1.0, 4.0]), ((200.0, 200.0, 200.0), [1.0, 4.0, 15.0]), ((9.0,), [1.0]), ((np.inf,) * 3, [1.0, 4.0, 16.0])],
+    [((200.0, 30.0), [0.4, 1.6]), ((200.0,) * 4, [0.4, 1.6, 6.4, 11.6]), ((3.9,), [0.4]), ((np.inf,) * 4, [0.4, 1.6, 6.4, 21.6])],
 )  # fmt: skip
 def test_a_pilot_grows_as_long_as_what_it_foretells_is_worth_it(
     foretold: tuple[float, ...], looks: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A second's look foretold 214 s of a render of 29; a tenth of that was a pilot of 22 s."""
+    """A look of a second foretold 214 s of a render of 29; a tenth of that was a pilot of 22 s."""
     taken: list[float] = []
 
     class Look:
@@ -160,7 +161,7 @@ def test_a_pilot_grows_as_long_as_what_it_foretells_is_worth_it(
     monkeypatch.setattr(quality, "Session", Look)
     monkeypatch.setattr(quality, "choose", lambda told, step: quality.Choice("as set", seconds=told))
     assert quality.pilot(small(), "GOOD").seconds == foretold[-1]
-    assert taken == looks
+    assert taken == pytest.approx(looks)
 
 
 def test_cancelling_the_pilot_ends_the_render() -> None:
@@ -190,3 +191,15 @@ def test_without_the_library_the_render_goes_on_and_says_so(monkeypatch: pytest.
     result = render(small(denoise=True))
     assert np.array_equal(result.passes["Combined"], render(small()).passes["Combined"])
     assert result.stats["warnings"] == ["The picture is not denoised: Open Image Denoise is not here."]
+
+
+def test_what_a_pilot_builds_serves_the_render(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of its renders built anew: in a scene of 439,000 triangles a pilot took 8 s of 27."""
+    made: list[object] = []
+    real = core.render.Renderer
+    monkeypatch.setattr(core.render, "Renderer", lambda *given: made.append(given) or real(*given))
+    scene = small()
+    scene.settings = replace(scene.settings, quality="DRAFT")
+    result = render(scene)
+    assert result.stats["quality"]["pilot_seconds"] > 0.0 and result.stats["reused"]
+    assert len(made) == 1 and result.stats["stopped_by"] == "error"

@@ -20,6 +20,7 @@ from luch import denoise
 from luch.accuracy import NORMAL_95
 from luch.effects import effects_of
 from luch.identity import identity_of
+from luch.kept import Kept, room_for_both
 from luch.report.plan import AS_SET, EXACT, Plan, Variant, plan
 from luch.report.results import Point, Report, Row
 from luch.report.shots import GoesOn, Shot, scaled, shoot
@@ -84,10 +85,11 @@ class Cancelled(Exception):
 class Session:
     """One report while it is made. only: which variants. size, samples: of the small
     pictures, 0: as the time allows. rounds: at most. patience: it is planned for its seconds, and
-    may take so many times as long where the machine turns out slower."""
+    may take so many times as long where the machine turns out slower. kept: what earlier renders of the scene have built."""
 
     def __init__(self, scene: Scene, seconds: float, watch: Watch | None, only: Callable[[Variant], bool] | None = None,
-                 *, size: int = 0, samples: int = 0, rounds: int = MOST_ROUNDS, patience: float = 1.0) -> None:  # fmt: skip
+                 *, size: int = 0, samples: int = 0, rounds: int = MOST_ROUNDS, patience: float = 1.0,
+                 kept: Kept | None = None) -> None:  # fmt: skip
         if not seconds > 0.0:
             raise ValueError(f"A report needs time: {seconds:g} seconds were given.")
         self.scene, self.seconds, self._watch, self._only, self._size = scene, seconds, watch, only, size
@@ -98,6 +100,9 @@ class Session:
         self._denoise_seconds = 0.0
         self._ratio_spread = 0.0  # of the logarithm of one ratio of times, over all variants
         self._unmeasured: list[str] = []
+        # Most variants differ in what is decided while paths are traced: they share what is built.
+        self._kept = (kept or Kept()) if room_for_both(scene) else None
+        self._built_seconds = 0.0  # of what is shared
         self._wide_margin = WRITING_SECONDS if seconds > 10.0 * WRITING_SECONDS else WRITING_SHARE * seconds
 
     # -- time -------------------------------------------------------------------------------------
@@ -122,11 +127,27 @@ class Session:
 
     def _shoot(self, doing: str, scene: Scene, seed: int, samples: int, *, denoised: bool = False,
                goes_on: GoesOn | None = None) -> Shot:  # fmt: skip
+        """Its build_seconds are those of a render alone, even where nothing was built."""
         self._doing = doing
-        shot = shoot(scene, seed, samples, goes_on or self._goes_on, denoised=denoised) if self._goes_on() else None
+        shares = self._shares(scene)
+        kept = self._kept if shares else None
+        goes_on = goes_on or self._goes_on
+        shot = shoot(scene, seed, samples, goes_on, denoised=denoised, kept=kept) if self._goes_on() else None
         if shot is None:
             raise Cancelled
+        if shares:
+            self._built_seconds = shot.build_seconds = shot.build_seconds or self._built_seconds
         return shot
+
+    def _shares(self, scene: Scene) -> bool:
+        return self._kept is not None and self._kept.serves(scene)
+
+    def _build_expected(self, shot: Shot) -> float:
+        """Seconds that a variant's render takes to build, on the mean over all. shot: of the scene as it is set."""
+        if self._kept is None or not self._variants:
+            return shot.build_seconds
+        anew = sum(not self._shares(variant.of(self.scene)) for variant in self._variants)
+        return shot.build_seconds * anew / len(self._variants)
 
     # -- the story --------------------------------------------------------------------------------
 
@@ -168,8 +189,9 @@ class Session:
             self._denoise_seconds = denoise.seconds_for(self.scene.film.pixels)
         if not self._goes_on():
             raise Cancelled
-        self._choose_size(pace, shot.build_seconds)
-        self._drop_what_does_not_fit(pace, shot.build_seconds)
+        build = self._build_expected(shot)
+        self._choose_size(pace, build)
+        self._drop_what_does_not_fit(pace, build)
 
     def _choose_size(self, pace: float, build: float) -> None:
         """The picture grows with the time; samples grow when it is large enough."""
@@ -203,7 +225,8 @@ class Session:
         until = self.spent + REFERENCE_SHARE * self.left
         first = self._shoot("reference", exact, REFERENCE_SEEDS[0], self._samples)
         each = max(first.trace_seconds / self._samples, 1e-6)
-        wanted = (until - self.spent - 2.0 * first.build_seconds) / (2.0 * each)
+        build = 0.0 if self._shares(exact) else first.build_seconds
+        wanted = (until - self.spent - 2.0 * build) / (2.0 * each)
         done = max(2 * self._samples, 1 << int(math.log2(max(2.0, min(wanted, MOST_OVER * self._samples)))))
         shots = [self._shoot("reference", exact, seed, done, denoised=self._filters) for seed in REFERENCE_SEEDS]
         halves = [shot.last.astype(np.float64) for shot in shots]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from luch import denoise
+from luch.kept import Kept
 from luch.pixel_error import wanted
 from luch.render import Progress, render
 from luch.scene import F32, Scene
@@ -24,7 +25,7 @@ class Shot:
 
     pictures: dict[int, F32] = field(default_factory=dict)
     filtered: dict[int, F32] = field(default_factory=dict)
-    build_seconds: float = 0.0
+    build_seconds: float = 0.0  # 0 where what earlier ones had built served
     trace_seconds: float = 0.0  # of a clock on the wall
     trace_cpu_seconds: float = 0.0  # of all threads of this process
     stats: dict[str, Any] = field(default_factory=dict)
@@ -50,16 +51,17 @@ def scaled(scene: Scene, longest: int) -> Scene:
     return replace(scene, film=small, settings=settings)
 
 
-def shoot(scene: Scene, seed: int, samples: int, goes_on: GoesOn, *, denoised: bool = False) -> Shot | None:
+def shoot(scene: Scene, seed: int, samples: int, goes_on: GoesOn, *, denoised: bool = False,
+          kept: Kept | None = None) -> Shot | None:  # fmt: skip
     """Renders `scaled` scenes; pictures are kept at powers of two and at the end. None where `goes_on` said no; it is
-    asked about ten times a second."""
-    shot, kept = Shot(), {samples, *(1 << k for k in range(20) if FIRST_KEPT <= 1 << k < samples)}
+    asked about ten times a second. kept: as luch.render.render has it."""
+    shot, shown = Shot(), {samples, *(1 << k for k in range(20) if FIRST_KEPT <= 1 << k < samples)}
     clock = _Clock()
 
     def watch(progress: Progress) -> bool:
         if progress.new_picture:
             with clock.stopped(progress.samples):
-                if progress.samples in kept:
+                if progress.samples in shown:
                     passes = progress.passes()
                     shot.pictures[progress.samples] = passes["Combined"][..., :3].copy()
                     if denoised:
@@ -67,10 +69,11 @@ def shoot(scene: Scene, seed: int, samples: int, goes_on: GoesOn, *, denoised: b
         return goes_on()
 
     settings = replace(scene.settings, seed=seed, samples=max(2, samples))
-    result = render(replace(scene, settings=settings), progress=watch)
+    result = render(replace(scene, settings=settings), progress=watch, kept=kept)
     if result.cancelled:
         return None
-    shot.stats, shot.build_seconds = result.stats, result.stats["prepare_seconds"]
+    shot.stats = result.stats
+    shot.build_seconds = 0.0 if result.stats["reused"] else result.stats["prepare_seconds"]
     shot.trace_seconds, shot.trace_cpu_seconds = clock.all_samples()
     return shot
 
