@@ -83,7 +83,7 @@ class Kept:
         """scene: as the caller has it; traced: what is to be rendered of it; make: for a new renderer."""
         held = self._held
         if held is not None and self._scene is not None:
-            if _alike(scene, self._scene, _VIEW, _FREE):
+            if self.serves(scene):
                 seen = self._see(held, scene, traced)
                 if seen is not None:
                     return seen

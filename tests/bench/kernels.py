@@ -16,6 +16,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "native"), str(ROOT / "tests")]
 
 from luch.cuda import compiler  # noqa: E402
 from luch.cuda.host import HostScene  # noqa: E402
-from luch.cuda.plan import curve_flags  # noqa: E402
 from luch.cuda.scene_kernels import STAGES, sources_of  # noqa: E402
-from luch.cuda.trace import MOVING  # noqa: E402
+from luch.cuda.trace import ray_kernels  # noqa: E402
 from luch.scene import Scene  # noqa: E402
 from luch.scenefile import read_scene  # noqa: E402
 from support.checkout import commit  # noqa: E402
@@ -39,7 +39,7 @@ ENTRY = re.compile(r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame,
                    r"(\d+) bytes spill loads.*?Used (\d+) registers", re.S)  # fmt: skip
 
 
-def compiled(module: str, precision: str, flags: list[str], programs: str, architecture: int) -> dict[str, Any]:
+def compiled(module: str, precision: str, flags: Sequence[str], programs: str, architecture: int) -> dict[str, Any]:
     """Kernels of a module by name, bytes of its code, processor seconds. Raises RuntimeError if it does not compile."""
     include, kernels = compiler.source_folders()
     with tempfile.TemporaryDirectory() as folder:
@@ -71,9 +71,9 @@ def kernels_of(scene: Scene, architecture: int) -> dict[str, Any]:
     own = sources_of(facts, blocks, scene)
     precision = scene.settings.precision
     found = compiled(STAGES, precision, own.flags, own.programs, architecture)
-    rays = (*(MOVING * facts["trees_move"]), *curve_flags(scene.settings.curve_shape if facts["curves"] else ""))
-    traced = compiled(f"TRACE_{facts['structure']}", precision, list(rays), "", architecture)["kernels"]
-    one = "_one" if facts["world_apart"] and facts["structure"] == "CWBVH" else ""
+    kind, curves = facts["structure"], scene.settings.curve_shape if facts["curves"] else ""
+    flags, one = ray_kernels(kind, facts["world_apart"], facts["trees_move"], curves)
+    traced = compiled(f"TRACE_{kind}", precision, flags, "", architecture)["kernels"]
     for kind in ("closest", "any"):
         found["kernels"][f"trace_{kind}"] = traced[f"trace_{kind}{one}"]
     return found

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from support.accel_meshes import icosphere, random_rays
 from support.devices import both, check_equal
 from support.effects import closure, program
-from support.from_above import Build, add_ball, scene_of, three_places, white
+from support.from_above import Build, add_ball, balls, scene_of, three_places, white
 
 F32 = NDArray[np.float32]
 SIZE = 24
@@ -38,12 +38,6 @@ def shows(operation: str, outputs: slice, attribute: str = "") -> Build:
         b.closure("CLOSURE_EMISSION", tuple(values if len(values) == 3 else values * 3))
 
     return build
-
-
-def balls(*rows: tuple[float, float, float, float]) -> Mesh:
-    """A mesh of spheres alone: x, y, z, radius."""
-    none = np.zeros((0, 3), np.float32)
-    return Mesh("Dust", none, none.astype(np.uint32), np.zeros(0, np.uint16), spheres=np.array(rows, np.float32))
 
 
 def rendered(scene: Scene) -> Result:

@@ -25,7 +25,9 @@ from luch.shader import ProgramBuilder
 from support.accel_meshes import icosphere
 from support.effects import closure, principled, program
 from support.everything import everything, quad
+from support.from_above import balls
 from support.hair import fibre, strands
+from support.hard_scenes import mesh_of
 
 
 def _material(scene: Scene, index: int, build: Callable[[ProgramBuilder], None]) -> None:
@@ -133,19 +135,12 @@ def _round_hair(scene: Scene) -> None:
 
 
 def _cloud(scene: Scene) -> None:
-    none = np.zeros((0, 3), np.float32)
-    dust = np.array([[-0.8, 0.4, 0.7, 0.2], [0.3, -0.6, 0.9, 0.15], [0.9, 0.8, 0.5, 0.1]], np.float32)
-    _show(scene, Mesh("Dust", none, none.astype(np.uint32), np.zeros(0, np.uint16), spheres=dust), _chalk)
+    _show(scene, balls((-0.8, 0.4, 0.7, 0.2), (0.3, -0.6, 0.9, 0.15), (0.9, 0.8, 0.5, 0.1)), _chalk)
 
 
 def _skin(scene: Scene) -> None:
     positions, triangles = icosphere(1)
-    ball = Mesh(
-        "Wax",
-        positions * np.float32(0.4) + np.float32([0.9, -0.9, 0.6]),
-        triangles,
-        np.zeros(len(triangles), np.uint16),
-    )
+    ball = mesh_of("Wax", (positions * np.float32(0.4) + np.float32([0.9, -0.9, 0.6]), triangles))
     inputs = {"color": (0.8, 0.5, 0.4), "radius": 0.1, "ior": 1.4, "alpha": 1.0, "anisotropy": 0.0}
     _show(scene, ball, lambda b: closure(b, "CLOSURE_SUBSURFACE", inputs, params=(1, 0)))
 

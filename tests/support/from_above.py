@@ -57,6 +57,12 @@ def scene_of(
     )
 
 
+def balls(*rows: tuple[float, float, float, float]) -> Mesh:
+    """A mesh of spheres alone: x, y, z, radius."""
+    none = np.zeros((0, 3), np.float32)
+    return Mesh("Dust", none, none.astype(np.uint32), np.zeros(0, np.uint16), spheres=np.array(rows, np.float32))
+
+
 def add_ball(mesh: Mesh) -> None:
     """A lumpy ball of triangles among the mesh's other primitives."""
     positions, triangles = icosphere(2)

@@ -47,6 +47,14 @@ def upload_trees(blocks: Blocks, links: Links, left: Left, depth: int) -> Device
     return copy
 
 
+def ray_kernels(
+    kind: str, world_apart: bool, moves: bool, curves: str, timed: bool = False
+) -> tuple[tuple[str, ...], str]:
+    """What the module TRACE_{kind} is compiled with, and how the names of its kernels end, for such trees: as
+    SceneTracer has them."""
+    return MOVING * moves + curve_flags(curves) + TIMED_RAYS * timed, "_one" * (world_apart and kind == "CWBVH")
+
+
 class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
@@ -60,8 +68,8 @@ class SceneTracer:
         written. Kernels lack the code of what is not asked for. May raise TreesTooDeep.
         """
         self._trees = upload_trees(blocks, links, left, depth)
-        self._module = load(f"TRACE_{kind}", precision, MOVING * moves + curve_flags(curves) + TIMED_RAYS * timed)
-        one = "_one" if world_apart and kind == "CWBVH" else ""
+        flags, one = ray_kernels(kind, world_apart, moves, curves, timed)
+        self._module = load(f"TRACE_{kind}", precision, flags)
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
         # What moves comes after what stands still, which is found as if nothing moved.
         self._then: dict[str, Kernel] = {}

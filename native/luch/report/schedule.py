@@ -127,7 +127,7 @@ class Session:
 
     def _shoot(self, doing: str, scene: Scene, seed: int, samples: int, *, denoised: bool = False,
                goes_on: GoesOn | None = None) -> Shot:  # fmt: skip
-        """Its build_seconds are those of a render alone, even where nothing was built."""
+        """Its build_seconds: where it shares what this session has built, what that took."""
         self._doing = doing
         shares = self._shares(scene)
         kept = self._kept if shares else None
@@ -144,8 +144,6 @@ class Session:
 
     def _build_expected(self, shot: Shot) -> float:
         """Seconds that a variant's render takes to build, on the mean over all. shot: of the scene as it is set."""
-        if self._kept is None or not self._variants:
-            return shot.build_seconds
         anew = sum(not self._shares(variant.of(self.scene)) for variant in self._variants)
         return shot.build_seconds * anew / len(self._variants)
 

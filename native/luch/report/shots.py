@@ -25,7 +25,7 @@ class Shot:
 
     pictures: dict[int, F32] = field(default_factory=dict)
     filtered: dict[int, F32] = field(default_factory=dict)
-    build_seconds: float = 0.0  # 0 where what earlier ones had built served
+    build_seconds: float = 0.0  # 0 where what earlier renders have built serves
     trace_seconds: float = 0.0  # of a clock on the wall
     trace_cpu_seconds: float = 0.0  # of all threads of this process
     stats: dict[str, Any] = field(default_factory=dict)
