@@ -9,7 +9,7 @@ import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 from buildtools.failure import BuildFailure
 from buildtools.places import BUILD, NATIVE, VENV_PYTHON
@@ -23,12 +23,21 @@ OLDEST = 75  # PTX for it runs on everything newer
 FUSES_BOXES = re.compile("CWBVH|TRACE_.*|RENDER_STAGES|RENDER_WALKS")
 # Where a walk is in doubt, its cells are found in double (accel/grid.h).
 WALKS_IN_DOUBLE = re.compile("(TRACE_)?(HIERARCHICAL_)?GRID")
-# To machine code in minutes. Not by the driver of a user: luch.cuda.compiler has them compiled for the scene instead.
-MINUTES = ("RENDER_STAGES",)
+# Kernels that hold all that any scene may need: compiled as a whole, ptxas copies every function into each kernel that
+# calls it, 228 s and 10 MB an architecture; as functions that stand once, and linked, it takes 9 s and 3.5 MB. By a
+# user's driver they would be compiled as a whole: luch.cuda.compiler has them compiled for the scene instead.
+LINKED = ("RENDER_STAGES",)
+LINKED_REGISTERS = 128  # of functions that stand apart: as the stages have them
 # Functions of rare effects, which modules that serve many scenes lack.
-OF_RARE = re.compile("closest_moving|any_moving|test_piece|eval_fibre|move_instance")
-SERVES_MANY = re.compile("TRACE_.*|RENDER_STAGES")
-Unit = Tuple[str, str]  # module, precision
+OF_RARE = re.compile("closest_moving|any_moving|test_piece|move_instance")
+
+
+class Unit(NamedTuple):
+    """What is compiled once for each architecture."""
+
+    module: str
+    precision: str
+    defines: Tuple[str, ...] = ()
 
 
 def table() -> Dict[str, Any]:
@@ -38,16 +47,17 @@ def table() -> Dict[str, Any]:
 
 
 def units() -> List[Unit]:
-    """Every module and tracer in every precision; the longest to compile, the stages, first."""
+    """Every module and tracer in every precision, and what kernels.json says of defines; the longest to compile, the
+    stages, first.
+    """
     precisions = [name for name in table()["flags"] if name != "all"]
-    return [(name, DEFAULT) for name in [*table()["stages"], *table()["builders"]]] + [
-        (module, precision) for module in _traced() for precision in precisions
-    ]
-
-
-def _lean(module: str) -> List[str]:
-    """General stages lack the code of rare effects: three times as long to compile, for scenes that are few."""
-    return [f"-DLUCH_PLAN_{name}=0" for name in table()["rare"]] if module == "RENDER_STAGES" else []
+    served = [(name, DEFAULT) for name in [*table()["stages"], *table()["builders"]]]
+    served += [(module, precision) for module in _traced() for precision in precisions]
+    result = []
+    for module, precision in served:
+        every = table()["ahead"].get(module, [[]])
+        result += [Unit(module, precision, tuple(defines)) for defines in (every if precision == DEFAULT else [[]])]
+    return sorted(result, key=lambda unit: unit.module not in LINKED)
 
 
 def _traced() -> Dict[str, str]:
@@ -58,8 +68,8 @@ def _traced() -> Dict[str, str]:
 def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
     """PTX of every unit, and FOLDER/MODULE-PRECISION-sm_XX.cubin. None where no nvcc is. Raises BuildFailure.
 
-    everywhere: all units for all architectures; else those of the default precision, the others and the general
-    stages, each minutes of one processor, for the oldest and the newest.
+    everywhere: all units for all architectures; else those of the default precision, the others for the oldest and the
+    newest.
     """
     nvcc = shutil.which("nvcc")
     if nvcc is None:
@@ -68,23 +78,28 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
     FOLDER.mkdir(parents=True, exist_ok=True)
 
     def to_ptx(unit: Unit) -> str:
-        module, precision = unit
-        flags = table()["flags"]["all"] + table()["flags"][precision] + _lean(module)
+        flags = table()["flags"]["all"] + table()["flags"][unit.precision] + list(unit.defines)
+        flags += ["-rdc=true"] if unit.module in LINKED else []
         folders = ["-I", str(NATIVE / "include"), "-I", str(NATIVE / "cuda")]
-        source = NATIVE / "cuda" / {**_traced(), **table()["builders"], **table()["stages"]}[module]
+        source = NATIVE / "cuda" / {**_traced(), **table()["builders"], **table()["stages"]}[unit.module]
         return _errors(
             [found, "-ptx", f"-arch=compute_{OLDEST}", *flags, *folders, str(source), "-o", str(ptx_of(unit))]
         )
 
     def to_cubin(task: Tuple[Unit, int]) -> str:
-        ptx, architecture = ptx_of(task[0]), task[1]
-        cubin = ptx.with_name(f"{ptx.stem}-sm_{architecture}.cubin")
-        return _errors([_ptxas(found), f"-arch=sm_{architecture}", str(ptx), "-o", str(cubin)])
+        unit, architecture = task
+        ptx, target = str(ptx_of(unit)), f"-arch=sm_{architecture}"
+        cubin = str(_cubin_of(unit, architecture))
+        if unit.module not in LINKED:
+            return _errors([_beside(found, "ptxas"), target, ptx, "-o", cubin])
+        parts = f"{cubin}.o"
+        return _errors(
+            [_beside(found, "ptxas"), "-c", f"-maxrregcount={LINKED_REGISTERS}", target, ptx, "-o", parts]
+        ) or _errors([_beside(found, "nvlink"), target, parts, "-o", cubin])
 
     def wanted(unit: Unit) -> List[int]:
         known: List[int] = table()["architectures"]
-        every = everywhere or (unit[1] == DEFAULT and unit[0] not in MINUTES)
-        return known if every else [known[0], known[-1]]
+        return known if everywhere or unit.precision == DEFAULT else [known[0], known[-1]]
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         failures = [text for text in pool.map(to_ptx, units()) if text]
@@ -99,12 +114,17 @@ def compile_kernels(everywhere: bool) -> Optional[Dict[Unit, Path]]:
 
 def ptx_of(unit: Unit) -> Path:
     """Where a unit's PTX lies."""
-    return FOLDER / f"{unit[0]}-{unit[1]}.ptx"
+    words = [word.split("LUCH_PLAN_")[-1].replace("=", "") for word in unit.defines]
+    return FOLDER / ("-".join([unit.module, unit.precision, *words]) + ".ptx")
 
 
-def _ptxas(nvcc: str) -> str:
-    beside = Path(nvcc).resolve().with_name("ptxas")
-    return str(beside) if beside.exists() else "ptxas"
+def _cubin_of(unit: Unit, architecture: int) -> Path:
+    return FOLDER / f"{ptx_of(unit).stem}-sm_{architecture}.cubin"
+
+
+def _beside(nvcc: str, tool: str) -> str:
+    path = Path(nvcc).resolve().with_name(tool)
+    return str(path) if path.exists() else tool
 
 
 def _errors(command: List[str]) -> str:
@@ -114,7 +134,7 @@ def _errors(command: List[str]) -> str:
 
 def faults(unit: Unit, ptx: str) -> List[str]:
     """What a unit's instructions must not hold: slow doubles where speed is asked, sums fused behind our back."""
-    module, precision = unit
+    module, precision, defines = unit
     wrong = []
     if precision == "FAST" and not WALKS_IN_DOUBLE.fullmatch(module) and re.search(r"\.f64\b", ptx):
         wrong.append("instructions in double precision (.f64), which FAST must not have")
@@ -124,7 +144,7 @@ def faults(unit: Unit, ptx: str) -> List[str]:
         wrong.append("fma.rn.f32: results would differ from the CPU's")
     if precision != "FAST" and re.search(r"\.ftz\b", ptx):
         wrong.append(".ftz: denormal numbers would be lost")
-    rare = OF_RARE.search(ptx) if SERVES_MANY.fullmatch(module) else None
+    rare = OF_RARE.search(ptx) if module.startswith("TRACE_") and not defines else None
     if rare:
         wrong.append(f"{rare.group()}: code of an effect that most scenes lack")
     return [f"{module}, {precision}: {text}" for text in wrong]
@@ -149,17 +169,17 @@ def place_kernels() -> None:
         raise BuildFailure("build --cuda needs nvcc on PATH; without it kernels are compiled on first use by NVRTC")
     code = (
         "import json, sys; from luch.cuda.compiler import ahead_name; "
-        "print(json.dumps([ahead_name(*unit) for unit in json.loads(sys.argv[1])]))"
+        "print(json.dumps([ahead_name(*each) for each in json.loads(sys.argv[1])]))"
     )
-    wanted = [(*unit, architecture) for unit in units() for architecture in table()["architectures"]]
-    wanted += [(*unit, 0) for unit in units() if unit[0] not in MINUTES]
-    names = output([str(VENV_PYTHON), "-c", code, json.dumps(wanted)])
+    wanted = [(unit, architecture) for unit in units() for architecture in table()["architectures"]]
+    wanted += [(unit, 0) for unit in units() if unit.module not in LINKED]
+    asked = [(unit.module, unit.precision, architecture, unit.defines) for unit, architecture in wanted]
+    names = output([str(VENV_PYTHON), "-c", code, json.dumps(asked)])
     if names is None:
         raise BuildFailure("luch.cuda could not be imported from native/")
     shutil.rmtree(AHEAD, ignore_errors=True)
     AHEAD.mkdir()
-    for (module, precision, architecture), name in zip(wanted, json.loads(names)):
-        target = f"-sm_{architecture}.cubin" if architecture else ".ptx"
-        shutil.copyfile(FOLDER / f"{module}-{precision}{target}", AHEAD / name)
+    for (unit, architecture), name in zip(wanted, json.loads(names)):
+        shutil.copyfile(_cubin_of(unit, architecture) if architecture else ptx_of(unit), AHEAD / name)
     size = sum(path.stat().st_size for path in AHEAD.iterdir())
     print(f"{len(wanted)} kernels, {size / 1e6:.0f} MB in {AHEAD}; the next package carries them")

@@ -81,7 +81,7 @@ def luch(options: argparse.Namespace) -> int:
 
     import numpy as np
     from device_render import StageTimes
-    from luch.cuda import device
+    from luch.cuda import compiler, device
     from luch.render import render
     from luch.scenefile import read_scene
     from support.checkout import commit
@@ -97,6 +97,7 @@ def luch(options: argparse.Namespace) -> int:
             return render(replace(scene, film=film, settings=settings))
 
         first = run(1)  # compiles
+        compiler.quiet()  # where general kernels began it
         one, many = run(1), run(SAMPLES)
         with StageTimes() as times:
             run(64)
@@ -132,7 +133,7 @@ def _general_over_own(run: Callable[[int], Any]) -> float | None:
         return many["render_seconds"] - one["render_seconds"], many["kernels"] == "general"
 
     own = seconds()[0]
-    nothing = mock.patch.object(compiler, "kept_scene", return_value=None)
+    nothing = mock.patch.object(compiler, "kept", return_value=None)
     with nothing, mock.patch.object(SceneKernels, "_compile"), mock.patch.object(SceneKernels, "_take"):
         try:
             general, real = seconds()

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from luch.cuda import compiler, scene_kernels
+from luch.cuda import compiler, plan, scene_kernels, trace
 from luch.cuda.device import DeviceError
-from luch.scene import Scene
+from luch.samplers import FAMILIES
+from luch.scene import Scene, Settings
 from support.frames import resident_mib
 
 ASKED = ("RENDER_STAGES", "WATERTIGHT", 90, "programs", ("-DA=1",))
@@ -38,13 +39,13 @@ class Compiler:
 @pytest.fixture
 def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
     made = Compiler()
-    monkeypatch.setattr(compiler, "compiled_scene", made)
-    monkeypatch.setattr(compiler, "kept_scene", lambda *asked: None)
+    monkeypatch.setattr(compiler, "compiled", made)
+    monkeypatch.setattr(compiler, "kept", lambda *asked: None)
     monkeypatch.setattr(compiler, "ahead", lambda *asked: b"general")
     monkeypatch.setattr(
         compiler, "scene_module", lambda image, device: SimpleNamespace(kernel=lambda name: (name, image))
     )
-    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: dict.fromkeys(compiler.rare_effects(), False))
+    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: {"TIME": False})
     monkeypatch.setattr(scene_kernels, "architecture_of", lambda module: 90)
     monkeypatch.setattr(scene_kernels, "cupy", lambda: SimpleNamespace(cuda=SimpleNamespace(Device=lambda: SimpleNamespace(id=0))))  # fmt: skip
     yield made
@@ -66,6 +67,33 @@ def test_a_hundred_frames_that_are_drawn_meanwhile_start_one_compiler(slow: Comp
     assert compiler.quiet(30.0)
     assert threading.active_count() == threads
     assert all(one.kernel("shade")[1] == b"own" and not one.general for one in frames)
+
+
+@pytest.mark.parametrize("effect", ["VOLUMES", "HAIR", "CURVES", "MOTION", "SUBSURFACE", "SAMPLER", "TIME"])
+def test_whatever_a_scene_needs_general_kernels_begin_it(
+    slow: Compiler, monkeypatch: pytest.MonkeyPatch, effect: str
+) -> None:
+    """All but the clocks of Render Time: those of other code would tell other prices."""
+    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: {"TIME": False, effect: True})
+    if effect == "TIME":
+        slow.may_end.set()
+    assert frame().general == (effect != "TIME")
+
+
+def test_kernels_beside_the_stages_are_compiled_ahead_for_all_that_moves_grows_and_draws() -> None:
+    """Names under which they are looked for are those under which build.py places them; no scene waits for them."""
+
+    def ready(module: str, defines: tuple[str, ...]) -> bool:
+        placed = {compiler.ahead_name(module, "WATERTIGHT", 90, those) for those in compiler.ready_made(module)}
+        return compiler.ahead_name(module, "WATERTIGHT", 90, defines) in placed
+
+    samplers = [plan.sampler_flags(Scene(settings=Settings(sampler=name))) for name in FAMILIES]
+    assert all(ready("RENDER_PATHS", flags) for flags in samplers) and len(set(samplers)) == len(FAMILIES)
+    for moves in (False, True):
+        assert all(ready("RENDER_WALKS", trace.MOVING * moves + flags) for flags in samplers)
+        for curves in ("", *plan.CURVE_SHAPES):
+            assert ready("TRACE_CWBVH", trace.ray_kernels("CWBVH", True, moves, curves)[0])
+    assert not ready("TRACE_CWBVH", trace.TIMED_RAYS)
 
 
 def test_scenes_that_differ_are_compiled_beside_each_other(slow: Compiler) -> None:

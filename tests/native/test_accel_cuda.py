@@ -19,7 +19,7 @@ from support.accel_meshes import HARD_MESHES, aimed_rays, icosphere, random_rays
 from support.cuda_on_cpu import FIBERS, GPU
 from support.hard_rays import assert_same_bits, device_rays
 
-from buildtools.kernels import faults
+from buildtools.kernels import Unit, faults
 
 KINDS = list(compiler.table()["modules"])
 
@@ -204,13 +204,13 @@ def test_rays_of_a_wrong_shape_raise_one_clear_error(place: str) -> None:
     ],
 )  # fmt: skip
 def test_gate_sees_instructions_that_a_precision_must_not_have(precision: str, line: str, wrong: bool) -> None:
-    assert bool(faults(("BVH2", precision), f"\t{line}, %x;\n")) == wrong
+    assert bool(faults(Unit("BVH2", precision), f"\t{line}, %x;\n")) == wrong
 
 
 def test_kernels_compiled_ahead_of_time_are_taken_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Found under the name that `build.py build --cuda` gives them; another architecture's are not."""
 
-    def compiled(module: str, precision: str, architecture: int) -> bytes:
+    def compiled(module: str, precision: str, architecture: int, programs: str, defines: Any) -> bytes:
         raise LookupError(f"{module} {precision} {architecture} would be compiled on first use")
 
     mesh, rays = soup(20), random_rays(30)

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from luch._native import core
-from luch.cuda import device, several
+from luch.cuda import compiler, device, several
 from luch.cuda import render as device_render
 from luch.cuda.render import DeviceRenderer
+from luch.cuda.scene_kernels import STAGES, SceneKernels
 from luch.kept import Kept
 from luch.render import Progress, render
 from luch.scene import Image, Instances, Light, Material, Scene
@@ -334,6 +335,30 @@ def test_kernels_of_any_two_effects_draw_what_general_ones_do(place: str, effect
     full = render(replace(scene, settings=replace(scene.settings, device="CUDA", force_effects=["ALL"])))
     for name, image in lean.passes.items():
         assert np.array_equal(image.view(np.uint32), full.passes[name].view(np.uint32)), name
+
+
+@pytest.mark.cuda
+@pytest.mark.parametrize("effects", covering_rows(), ids=lambda row: f"{len(row)} effects")
+def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(
+    place: str, effects: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which interpret programs, and hold all that any scene may need."""
+    if place == FIBERS:
+        pytest.skip("on a GPU alone")
+    architecture = device.architecture_of(device.cupy())
+    if compiler.ahead(STAGES, "WATERTIGHT", architecture, compiler.ready_made(STAGES)[0]) is None:
+        pytest.skip("build.py build --cuda was not run")
+    scene = scene_of(effects)
+    scene.settings.device = "CUDA"
+    with pytest.MonkeyPatch.context() as apart:
+        apart.setattr(compiler, "ready_made", lambda module: [("-DLUCH_NEVER_COMPILED=1",)])
+        own = render(scene)
+    monkeypatch.setattr(compiler, "kept", lambda *asked: None)
+    monkeypatch.setattr(SceneKernels, "_compile", lambda self, architecture: None)
+    general = render(scene)
+    assert (own.stats["kernels"], general.stats["kernels"]) == ("the scene's own", "general")
+    for name, image in own.passes.items():
+        assert np.array_equal(image.view(np.uint32), general.passes[name].view(np.uint32)), name
 
 
 @pytest.mark.parametrize("sampler", ["LATTICE", pytest.param("INDEPENDENT", marks=pytest.mark.cuda)])

@@ -18,7 +18,7 @@ from support.accel_meshes import icosphere, random_rays, rows, soup
 from support.cuda_on_cpu import GPU, compiles
 from support.instances import ALL, Scene, crowd, placed
 
-from buildtools.kernels import faults, table
+from buildtools.kernels import Unit, faults, table
 
 NATIVE = Path(__file__).resolve().parents[2] / "native"
 FEW = (
@@ -130,9 +130,9 @@ def test_equal_hits_go_to_the_smaller_instance_on_the_device(place: str) -> None
 
 def test_ptx_of_scenes_obeys_the_rules_of_precision() -> None:
     assert set(table()["tracers"]) == {f"TRACE_{kind}" for kind in STRUCTURES}
-    assert not faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f32")
-    assert faults(("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f64")
-    assert faults(("TRACE_CWBVH", "FAST"), "mul.f64")
+    assert not faults(Unit("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f32")
+    assert faults(Unit("TRACE_CWBVH", "WATERTIGHT"), "fma.rn.f64")
+    assert faults(Unit("TRACE_CWBVH", "FAST"), "mul.f64")
 
 
 @pytest.mark.parametrize("kind", STRUCTURES)

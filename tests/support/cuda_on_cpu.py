@@ -231,13 +231,10 @@ def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
         patch.setitem(sys.modules, "cupy", fake_cupy())
         patch.setattr(compiler, "AHEAD", folder)
 
-        def compiled(module: str, precision: str, architecture: int) -> bytes:
-            source, folders = compiler.source_of(module), list(compiler.source_folders())
-            return compile_module(source, precision, folder, folders, shares_memory).encode()
-
-        def compiled_scene(
-            module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]
-        ) -> bytes:
+        def compiled(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes:
+            if not programs and not defines:
+                source, folders = compiler.source_of(module), list(compiler.source_folders())
+                return compile_module(source, precision, folder, folders, shares_memory).encode()
             own = folder / hashlib.sha256((programs + " ".join(defines)).encode()).hexdigest()[:8]
             library = own / f"{compiler.source_of(module).stem}_{precision}.so"
             if library.exists():
@@ -250,8 +247,7 @@ def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
             ).encode()
 
         patch.setattr(compiler, "compiled", compiled)
-        patch.setattr(compiler, "kept_scene", lambda *given: None)
-        patch.setattr(compiler, "compiled_scene", compiled_scene)
+        patch.setattr(compiler, "kept", lambda *given: None)
         forget()
         yield
     forget()

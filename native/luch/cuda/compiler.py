@@ -67,10 +67,9 @@ def source_of(module: str) -> Path:
     return source_folders()[1] / name
 
 
-def rare_effects() -> list[str]:
-    """Names of LUCH_PLAN_... that the stages compiled ahead of time lack: scenes with them wait for their own."""
-    names: list[str] = table()["rare"]
-    return names
+def ready_made(module: str) -> list[tuple[str, ...]]:
+    """What `build.py build --cuda` compiles a module with beside the precision's flags: once for each of these."""
+    return [tuple(defines) for defines in table()["ahead"].get(module, [[]])]
 
 
 def flags(precision: str) -> list[str]:
@@ -78,9 +77,11 @@ def flags(precision: str) -> list[str]:
     return [*table()["flags"]["all"], *table()["flags"][precision]]
 
 
-def ahead_name(module: str, precision: str, architecture: int) -> str:
-    """File name under which a kernel compiled ahead of time is looked for. architecture 0: PTX, for all of them."""
-    parts = [_sources_hash(), source_of(module).name, *flags(precision), *rare_effects(), str(architecture)]
+def ahead_name(module: str, precision: str, architecture: int, defines: Sequence[str] = ()) -> str:
+    """File name under which a kernel compiled ahead of time is looked for. architecture 0: PTX, for all of them;
+    defines: what it was compiled with beside, as "-DNAME=1", in any order.
+    """
+    parts = [_sources_hash(), source_of(module).name, *flags(precision), *sorted(defines), str(architecture)]
     key = hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:16]
     return (
         f"{module}-{precision}-{key}.ptx"
@@ -92,7 +93,7 @@ def ahead_name(module: str, precision: str, architecture: int) -> str:
 def load(module: str, precision: str, defines: tuple[str, ...] = ()) -> Module:
     """The module of kernels.json for the current device. Raises DeviceError if it does not compile.
 
-    defines: what it is compiled with beside, as "-DNAME=1"; such a one is not there ahead of time.
+    defines: what it is compiled with beside, as "-DNAME=1".
     """
     return _loaded(module, precision, defines, int(cupy().cuda.Device().id))
 
@@ -100,10 +101,8 @@ def load(module: str, precision: str, defines: tuple[str, ...] = ()) -> Module:
 @functools.cache
 def _loaded(module: str, precision: str, defines: tuple[str, ...], device: int) -> Module:
     architecture = architecture_of(cupy())
-    if defines:
-        kept = kept_scene(module, precision, architecture, "", defines)
-        return Module(kept or compiled_scene(module, precision, architecture, "", defines))
-    return Module(ahead(module, precision, architecture) or compiled(module, precision, architecture))
+    ready = ahead(module, precision, architecture, defines)
+    return Module(ready or compiled(module, precision, architecture, "", defines))
 
 
 def _runs_on(architecture: int) -> list[int]:
@@ -114,25 +113,17 @@ def _runs_on(architecture: int) -> list[int]:
     return sorted((a for a in known if a // 10 == architecture // 10 and a <= architecture), reverse=True)
 
 
-def ahead(module: str, precision: str, architecture: int) -> bytes | None:
+def ahead(module: str, precision: str, architecture: int, defines: Sequence[str] = ()) -> bytes | None:
     """What build.py compiled ahead of time: machine code, or PTX where the build did not know the architecture.
 
     The stages have no PTX: the driver would need minutes for all that general code may do, NVRTC needs seconds for
     what a scene does.
     """
     for target in (*_runs_on(architecture), 0):
-        ready = AHEAD / ahead_name(module, precision, target)
+        ready = AHEAD / ahead_name(module, precision, target, defines)
         if ready.is_file():
             return ready.read_bytes()
     return None
-
-
-def compiled(module: str, precision: str, architecture: int) -> bytes:
-    """Machine code (PTX where NVRTC is older than the device) out of the cache, or compiled now and kept there."""
-    from cupy.cuda import nvrtc  # needs no device
-
-    unit = _Unit(module, precision, architecture, "", ())
-    return _kept(_cache_name(nvrtc, unit)) or _compile_and_keep(nvrtc, unit)
 
 
 @functools.lru_cache(maxsize=SCENES_KEPT)
@@ -141,15 +132,18 @@ def scene_module(image: bytes, device: int) -> Module:
     return Module(image)
 
 
-def kept_scene(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes | None:
-    """A scene's own kernels, if they were compiled before. programs: luch.cuda.programs.source."""
-    from cupy.cuda import nvrtc
+def kept(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes | None:
+    """What compiled() would give, if it was compiled before."""
+    from cupy.cuda import nvrtc  # needs no device
 
     return _kept(_cache_name(nvrtc, _Unit(module, precision, architecture, programs, tuple(defines))))
 
 
-def compiled_scene(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes:
-    """The same, compiled now and kept. Several devices of one kind wait for one compiler."""
+def compiled(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes:
+    """Machine code (PTX where NVRTC is older than the device) out of the cache, or compiled now and kept there.
+
+    programs: a scene's, luch.cuda.programs.source; "": none. Several devices of one kind wait for one compiler.
+    """
     from cupy.cuda import nvrtc
 
     unit = _Unit(module, precision, architecture, programs, tuple(defines))
@@ -162,7 +156,7 @@ class Compilation(threading.Thread):
     """A scene's own kernels on their way, while general ones render it."""
 
     def __init__(self, asked: tuple[str, str, int, str, tuple[str, ...]]) -> None:
-        """asked: of compiled_scene."""
+        """asked: of compiled()."""
         super().__init__(name="Luch compiles kernels", daemon=True)
         self._asked = asked
         self.image: bytes | None = None
@@ -172,7 +166,7 @@ class Compilation(threading.Thread):
     def run(self) -> None:
         began = time.perf_counter()
         try:
-            self.image = compiled_scene(*self._asked)
+            self.image = compiled(*self._asked)
         except Exception as error:  # handed to the threads that render, which raise it
             self.failure = error
         self.seconds = time.perf_counter() - began
@@ -187,7 +181,7 @@ _STARTING = threading.Lock()
 def compiling_scene(
     module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]
 ) -> Compilation:
-    """compiled_scene on a thread, one however many renders ask for the same: an animation draws hundreds of frames
+    """compiled() on a thread, one however many renders ask for the same: an animation draws hundreds of frames
     while its kernels compile.
     """
     asked = (module, precision, architecture, programs, tuple(defines))

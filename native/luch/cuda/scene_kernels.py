@@ -76,13 +76,14 @@ class SceneKernels:
 
     def _start(self, facts: dict[str, Any]) -> None:
         architecture = architecture_of(cupy())
-        kept = compiler.kept_scene(STAGES, self._precision, architecture, self._text, self._flags)
+        kept = compiler.kept(STAGES, self._precision, architecture, self._text, self._flags)
         if kept is not None:
             self._module = self._loaded(kept)
             return
         usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
-        usable = usable and not any(self.plan[name] for name in compiler.rare_effects())
-        general = compiler.ahead(STAGES, self._precision, architecture) if usable else None
+        usable = usable and not self.plan["TIME"]  # the clocks of other code would tell other prices
+        general_flags = compiler.ready_made(STAGES)[0]
+        general = compiler.ahead(STAGES, self._precision, architecture, general_flags) if usable else None
         self._compile(architecture)
         if general is not None:
             self._module, self.general = self._loaded(general), True
