@@ -127,8 +127,8 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
             ("REFERENCE", "Reference", "An error of 0.5 %, with nothing taken from the light"),
         ],
         default="CUSTOM",
-        description="How much error the picture may have. The settings that reach it soonest are found by a pilot on "
-        "this scene, which takes a second or a tenth of the time; Time Limit still holds",
+        description="How much error the picture may have. Where this scene takes long, a tenth of the time goes to "
+        "finding the settings that reach it soonest; Time Limit still holds",
     )
     quality_by_report: BoolProperty(
         name="By the Last Report",

@@ -1,9 +1,11 @@
 """One dial for those who want no more: how much error the picture may have; the scene's own curve says how to get there.
 
 Each step asks for an error. Which settings reach it soonest is found on this scene: by a report (luch.report) where one
-is given, else by a pilot: a first look, and a report of few choices that takes a tenth of the time that the render is foretold. A choice
-that takes light away counts with the largest bias that its measurement allows, and is taken only where it is surely
-sooner than the scene as it is set. The render itself then ends by its own error, as with an error limit.
+is given; else the picture is begun as it is set, and where its own curve foretells a long render, a pilot is flown
+between two of its steps: a report of few choices that takes a tenth of that time. A choice that takes light away counts
+with the largest bias that its measurement allows, and is taken only where it is surely sooner than what is left to do;
+then the picture begins anew. Short renders fly none, unless the picture shows that its settings take too much light
+for the error asked for. It ends by its own error, as with an error limit.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from luch.accuracy import percent
+from luch.cuda.device import DeviceError
 from luch.identity import identity_of
 from luch.kept import Kept
 from luch.report import files
@@ -23,7 +26,7 @@ from luch.report.plan import EXACT, Variant, exact_settings
 from luch.report.results import Report, Row
 from luch.report.schedule import Cancelled, Session, Told
 from luch.report.sentences import duration
-from luch.scene import Scene
+from luch.scene import Scene, Settings
 from luch.stopping import CUSTOM, STEPS, UNLIMITED_SAMPLES
 
 if TYPE_CHECKING:
@@ -33,10 +36,16 @@ if TYPE_CHECKING:
     Watch = Callable[[Progress], bool]
 
 TAKES_NOTHING = "REFERENCE"  # the step that allows no bias at all
-PILOT_SHARE = 0.1  # of the seconds that the render is foretold to take
-LEAST_PILOT, MOST_PILOT = 0.4, 30.0  # seconds; less tells nothing, more is not needed
-PILOT_GROWS = 4.0  # times as long as the look before: a short one may foretell five times too much
-PATIENCE = 4.0  # the first look at a scene may take so many times LEAST_PILOT where a busy machine needs it
+PILOT_SHARE = 0.1  # of the seconds that the picture is foretold to take still
+# Seconds. Shorter ones cannot tell choices apart that differ by SOONER; more is not needed.
+LEAST_PILOT, MOST_PILOT = 2.0, 30.0
+# Of that time must have been rendered before its forecast is believed: after .6 s a picture of 18 s foretold 90.
+SEEN_SHARE = 0.05
+# A picture that lost as much of its light to its settings, in parts of the error asked for, is looked at however short.
+# The bias of single pixels is larger than that of the mean.
+LOST_SHARE = 0.3
+LEAST_LOOK = 0.4  # seconds; for the bias of settings alone
+PATIENCE = 4.0  # a look may take so many times as long where a busy machine needs it
 SOONER = 0.85  # of the time as the scene is set: a choice that gains less is not worth other settings
 BIAS_SHARE = 0.7  # of the error asked for, that bias may make up
 FILTERED_RESERVE = 1.2  # of the samples that a denoised picture is foretold to need
@@ -54,8 +63,10 @@ class Choice:
     seconds: float = math.inf  # that the render is foretold to take
 
 
-def choose(report: Report, step: str) -> Choice:
-    """By a report. Raises KeyError for a step that there is not."""
+def choose(report: Report, step: str, begun: float = 0.0) -> Choice:
+    """By a report. begun: the share of the picture as it is set that is there already, and would be lost by another
+    choice. Raises KeyError for a step that there is not.
+    """
     error = STEPS[step]
     base, exact = report.base_row, report.row(EXACT)
     rows = [row for row in report.choices if row.name != EXACT]
@@ -71,10 +82,10 @@ def choose(report: Report, step: str) -> Choice:
     own = _seconds(base, error, report)
     first = min(rows, key=lambda row: _seconds(row, error, report), default=base)
     seconds = _seconds(first, error, report)
-    if not seconds < SOONER * own:
+    if not seconds < SOONER * own * (1.0 - begun):
         first, seconds = base, own
     name = "the scene as it is set" if first.name == report.base else f'"{first.name}"'
-    wanted = {**changes, **first.settings, **_end(first, error)}
+    wanted = {**changes, **first.settings, **_end(first, error, report)}
     told = f", foretold {duration(seconds)}" if math.isfinite(seconds) else ""
     return Choice(first.name, wanted, f"{step.capitalize()}: {percent(error)} % by {name}{told}", seconds)
 
@@ -85,64 +96,113 @@ def as_set(step: str, changes: dict[str, Any] | None = None) -> Choice:
     return Choice("as set", wanted, f"{step.capitalize()}: {percent(STEPS[step])} % by the scene as it is set")
 
 
-def _bias(row: Row) -> float:
-    """The most that it may be, of the relMSE."""
+def _bias(row: Row, report: Report) -> float:
+    """Of the relMSE, the most that it may be; of the scene as it is set what is sure, as noise that a short pilot cannot
+    see through is no reason to take more samples than a render without one.
+    """
+    if row.name == report.base:
+        return row.floor_relmse
     return row.floor.high**2 if row.biased and not row.denoised else 0.0
 
 
 def _seconds(row: Row, error: float, report: Report) -> float:
     """To an error, of the picture that the scene asks for."""
-    rest = error * error - _bias(row)
-    if _bias(row) > (BIAS_SHARE * error) ** 2:
+    rest = error * error - _bias(row, report)
+    if _bias(row, report) > (BIAS_SHARE * error) ** 2:
         return math.inf
     samples = max(1.0, row.line.samples_for(rest) * (FILTERED_RESERVE if row.denoised else 1.0))
     # A time that is not sure counts with its upper end.
     return row.seconds_of(samples * row.cost_high / row.cost, report.pixels) if samples <= row.known_until else math.inf
 
 
-def _end(row: Row, error: float) -> dict[str, Any]:
+def _end(row: Row, error: float, report: Report) -> dict[str, Any]:
     """How the render ends: by its noise, or, denoised, after so many samples, as its error is then no longer told."""
     if row.denoised:
         samples = math.ceil(FILTERED_RESERVE * max(1.0, row.line.samples_for(error * error)))
         return {"denoise": True, "samples": samples, "error_limit": 0.0}
-    return {"error_limit": math.sqrt(error * error - _bias(row)), "samples": UNLIMITED_SAMPLES}
+    return {"error_limit": math.sqrt(error * error - _bias(row, report)), "samples": UNLIMITED_SAMPLES}
 
 
-def pilot(scene: Scene, step: str, watch: Callable[[Told], bool] | None = None, kept: Kept | None = None) -> Choice:
-    """By a short report, if the render is going to be long enough to be worth one. Raises Cancelled when watch says no.
+class _Dial:
+    """A picture that was begun as it is set, and the pilot between two of its steps."""
 
-    kept: holds afterwards what was built for it, where there is room.
-    """
-    kept = kept or Kept()
-    exact = exact_settings(scene.settings)
-    plain = as_set(step, exact if step == TAKES_NOTHING else None)
-    quick = Session(scene, LEAST_PILOT, watch, only=lambda variant: variant.rank == 0, rounds=2, patience=PATIENCE,
-                    kept=kept)  # fmt: skip
-    try:
-        first = quick.run()
-    except Cancelled:
-        if quick.cancelled:
-            raise
-        return plain
-    if quick.cancelled:
-        raise Cancelled
-    found, last, spent = choose(first, step), LEAST_PILOT, LEAST_PILOT
-    while step != TAKES_NOTHING:
-        # An endless forecast is no reason for an endless pilot; a look that is shorter than the last tells nothing more.
-        seconds = min(MOST_PILOT - spent, PILOT_SHARE * found.seconds - spent, PILOT_GROWS * last)
-        if seconds < last:
-            break
-        session = Session(scene, seconds, watch, only=_worth_trying, kept=kept)
+    def __init__(self, scene: Scene, step: str, progress: Watch | None) -> None:
+        self._scene, self._step, self._progress = scene, step, progress
+        takes_nothing = step == TAKES_NOTHING
+        self.choice = as_set(step, exact_settings(scene.settings) if takes_nothing else None)
+        self.better: Choice | None = None  # the picture is to begin anew
+        self.seconds = 0.0  # of the pilot
+        self.warnings: list[str] = []
+        self.kept = Kept()  # what the pilot has built
+        # Another choice would be the halves' own; nothing is to be chosen where nothing may be taken.
+        self._decided = takes_nothing or scene.settings.verify
+        self._looked = False
+        self._start = time.perf_counter()
+
+    def watch(self, told: Progress) -> bool:
+        """For render()."""
+        if self._progress is not None and not self._progress(told):
+            return False
+        if self._decided or not told.new_picture or told.curve is None or not told.curve.points:
+            return True
+        left = self._left(told)
+        seconds = self._worth(told, left)
+        return seconds <= 0.0 or self._fly(told, seconds, left)
+
+    def _left(self, told: Progress) -> float:
+        """Seconds until the picture is there, by its own curve."""
+        left = told.forecast.seconds if told.forecast is not None else math.inf
+        limit = self._scene.settings.time_limit
+        return min(left, limit - (time.perf_counter() - self._start)) if limit > 0.0 else left
+
+    def _worth(self, told: Progress, left: float) -> float:
+        """Seconds for a pilot; 0: none now."""
+        assert told.steering is not None
+        seconds = min(MOST_PILOT, PILOT_SHARE * left)
+        if not self._looked:
+            self._looked = True
+            if told.steering.lost() > LOST_SHARE * STEPS[self._step]:
+                return max(LEAST_LOOK, seconds)
+        return (
+            seconds
+            if seconds >= LEAST_PILOT and told.seconds >= SEEN_SHARE * min(left, MOST_PILOT / PILOT_SHARE)
+            else 0.0
+        )
+
+    def _fly(self, told: Progress, seconds: float, left: float) -> bool:
+        """Whether the picture goes on."""
+        assert told.steering is not None
+        self._decided = True
+        began = time.perf_counter()
+        session = Session(self._scene, seconds, self._told_on(told), **self._variants(seconds), kept=self.kept)
+        report = None
         try:
             report = session.run()
         except Cancelled:
-            if session.cancelled:
-                raise
-            break
-        if session.cancelled:
-            raise Cancelled
-        found, last, spent = choose(report, step), seconds, spent + seconds
-    return found
+            pass  # not even one choice in time, or the user's word: both are looked at below
+        except (DeviceError, MemoryError) as error:
+            self.warnings.append(f"No settings were chosen, there is no room for a pilot beside the picture: {error}")
+        self.seconds = time.perf_counter() - began
+        told.steering.leave_out(self.seconds)
+        if session.cancelled or report is None:
+            return not session.cancelled
+        choice = choose(report, self._step, told.seconds / (told.seconds + left))
+        if choice.settings.keys() == {"error_limit", "samples"}:
+            told.steering.ask(choice.settings["error_limit"])
+            found = f"{as_set(self._step).reason}; a pilot of {duration(self.seconds)} found nothing sooner"
+            self.choice = replace(choice, reason=found)
+        else:
+            self.better = choice
+        return self.better is None
+
+    def _variants(self, seconds: float) -> dict[str, Any]:
+        if seconds < LEAST_PILOT:
+            return {"only": lambda variant: variant.rank == 0, "rounds": 2, "patience": PATIENCE}
+        return {"only": _worth_trying}
+
+    def _told_on(self, told: Progress) -> Callable[[Told], bool] | None:
+        progress = self._progress
+        return None if progress is None else lambda _: progress(replace(told, new_picture=False))
 
 
 def _worth_trying(variant: Variant) -> bool:
@@ -155,26 +215,43 @@ def rendered(scene: Scene, render: Render, progress: Watch | None) -> Result:
     settings = scene.settings
     if settings.quality not in STEPS:
         raise ValueError(f"Settings: quality is {settings.quality!r}; it can be {CUSTOM}, {', '.join(STEPS)}.")
-    start = time.perf_counter()
-    kept = Kept()
     report, warnings = _read(settings.quality_report, scene) if settings.quality_report else (None, [])
-    try:
-        if report is not None:
-            choice = choose(report, settings.quality)
-        else:
-            choice = pilot(scene, settings.quality, _told_on(progress), kept)
-    except Cancelled:  # the render ends at its first question
-        choice = as_set(settings.quality)
-    spent = time.perf_counter() - start
-    changed = replace(settings, quality=CUSTOM, **choice.settings)
-    if changed.time_limit > 0.0:
-        changed.time_limit = max(1e-3, changed.time_limit - spent)
-    result = render(replace(scene, settings=changed), progress=progress, kept=kept)
+    if report is not None:
+        choice = choose(report, settings.quality)
+        result = render(replace(scene, settings=_changed(settings, choice)), progress=progress)
+        seconds = {"pilot_seconds": 0.0, "lost_seconds": 0.0}
+    else:
+        result, choice, seconds, more = _steered(scene, render, progress)
+        warnings = [*warnings, *more]
     result.stats["quality"] = {"step": settings.quality, "choice": choice.name, "settings": choice.settings,
-                               "reason": choice.reason, "pilot_seconds": spent}  # fmt: skip
-    result.stats["total_seconds"] += spent
+                               "reason": choice.reason, **seconds}  # fmt: skip
     result.stats["warnings"] = [*result.stats.get("warnings", []), *warnings]
     return result
+
+
+def _steered(
+    scene: Scene, render: Render, progress: Watch | None
+) -> tuple[Result, Choice, dict[str, float], list[str]]:
+    """Begun as it is set; its picture, by which choice, what the choice cost, and warnings."""
+    settings, start = scene.settings, time.perf_counter()
+    dial = _Dial(scene, settings.quality, progress)
+    result = render(replace(scene, settings=_changed(settings, dial.choice)), progress=dial.watch)
+    seconds = {"pilot_seconds": dial.seconds, "lost_seconds": 0.0}
+    if dial.better is None:
+        return result, dial.choice, seconds, dial.warnings
+    spent = time.perf_counter() - start
+    seconds["lost_seconds"] = spent - dial.seconds
+    changed = _changed(settings, dial.better)
+    if changed.time_limit > 0.0:
+        changed.time_limit = max(1e-3, changed.time_limit - spent)
+    del result  # its renderer's memory
+    result = render(replace(scene, settings=changed), progress=progress, kept=dial.kept)
+    result.stats["total_seconds"] += spent
+    return result, dial.better, seconds, dial.warnings
+
+
+def _changed(settings: Settings, choice: Choice) -> Settings:
+    return replace(settings, quality=CUSTOM, **choice.settings)
 
 
 def _read(path: str, scene: Scene) -> tuple[Report | None, list[str]]:
@@ -185,17 +262,6 @@ def _read(path: str, scene: Scene) -> tuple[Report | None, list[str]]:
         raise ValueError(f"{path}: cannot be read as a report ({error}). Make it again.") from error
     if report.identity != identity_of(scene):
         whose = f'of another scene ("{report.scene}")' if report.identity else "older than this Luch"
-        return None, [
-            f"{path}: the report is {whose} and is not used; a pilot chose the settings. Make the report anew."
-        ]
+        return None, [f"{path}: the report is {whose} and is not used. Make the report anew."]
     width, height = scene.film.size
     return replace(report, full_width=width, full_height=height), []
-
-
-def _told_on(progress: Watch | None) -> Callable[[Told], bool] | None:
-    if progress is None:
-        return None
-    from luch.render import preparing
-
-    start = time.perf_counter()
-    return lambda _: progress(preparing(0, start))

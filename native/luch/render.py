@@ -45,6 +45,15 @@ QUICK_LOOK_SECONDS = 0.02  # taken however short the render, where an error is a
 PASS_SECONDS = 4e-9
 
 
+@dataclass(frozen=True)
+class Steering:
+    """What a caller may ask of a render between two steps, where Progress.new_picture is true."""
+
+    lost: Callable[[], float]  # share of the light that clamping and limits of bounces took so far (luch.ledger)
+    leave_out: Callable[[float], None]  # seconds that the caller has spent on something else: not the render's
+    ask: Callable[[float], None]  # another error to end by
+
+
 @dataclass
 class Progress:
     """What the caller is told while the picture grows. ``passes`` is only to be called from the callback."""
@@ -62,6 +71,7 @@ class Progress:
     forecast: Forecast | None = None  # of the error asked for, else of the next round one
     curve: Curve | None = None
     preparing: bool = False  # structures and lights are being built; no sample was traced yet
+    steering: Steering | None = None  # None while preparing
 
 
 @dataclass(frozen=True)
@@ -146,6 +156,9 @@ class _Loop:
         self.adaptive = _adaptive_for(scene.film, settings)
         self.prepared = start
         self.cancelled = self.timed_out = False
+        self._left_out = 0.0  # seconds
+        self._exposure = scene.film.exposure
+        self._steering = Steering(self._lost, self._leave_out, self._ask)
         pixels = scene.film.pixels
         self._look_expected = LOOK_SECONDS * pixels / max(1, os.cpu_count() or 1) if settings.estimate_error else 0.0
         self._look_cost = self._look_expected  # of the last one
@@ -154,7 +167,18 @@ class _Loop:
     @property
     def seconds(self) -> float:
         """Of rendering: since structures and lights were built."""
-        return time.perf_counter() - self.prepared
+        return time.perf_counter() - self.prepared - self._left_out
+
+    def _lost(self) -> float:
+        found = ledger.shares(self.renderer.stats(), self.renderer.passes()["Combined"], self._exposure)
+        return found.get("clamped_share", 0.0) + found.get("cut_share_estimate", 0.0)
+
+    def _leave_out(self, seconds: float) -> None:
+        self._left_out += seconds
+
+    def _ask(self, error: float) -> None:
+        self.settings = replace(self.settings, error_limit=error)
+        self.stopping.error, self.stopping.settled = error, 0
 
     def prepare(self) -> None:
         """Structures and lights."""
@@ -273,6 +297,7 @@ class _Loop:
                 asked_error=self.settings.error_limit,
                 forecast=self.curve.forecast(aim) if found else None,
                 curve=self.curve,
+                steering=self._steering,
             )
         )
 
@@ -334,7 +359,7 @@ def render(scene: Scene, *, progress: Callable[[Progress], bool] | None = None, 
         samples=loop.done,
         samples_asked=loop.stopping.samples,
         first_sample=settings.first_sample,
-        error_asked=settings.error_limit,
+        error_asked=loop.settings.error_limit,
         time_asked=settings.time_limit,
         prepare_seconds=loop.prepared - start,
         reused=prepared.reused,  # what earlier renders had built

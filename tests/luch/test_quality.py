@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from luch import denoise, quality, record
 from luch._native import core
 from luch.identity import identity_of
-from luch.render import render
+from luch.render import Progress, render
 from luch.report.files import write
 from luch.report.plan import AS_SET, EXACT
 from luch.report.results import Point, Report, Row
+from luch.report.schedule import Cancelled
 from luch.report.tally import Measured, NoiseLine
 from luch.scene import Scene
 from luch.stopping import CUSTOM, STEPS, UNLIMITED_SAMPLES
@@ -110,14 +112,14 @@ def test_a_report_decides_instead_of_a_pilot(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("identity", ["", "0123456789abcdef"])
-def test_a_report_of_another_scene_is_told_and_a_pilot_chooses(tmp_path: Path, identity: str) -> None:
+def test_a_report_of_another_scene_is_told_and_not_used(tmp_path: Path, identity: str) -> None:
     kept = report(EXACT_ROW, row(AS_SET, 1.0), row("4 bounces", 0.1, settings={"max_bounces": 4}))
     kept.identity = identity
     write(kept, {}, tmp_path)
     result = render(small(quality="DRAFT", quality_report=str(tmp_path / "report.json")))
     told = [text for text in result.stats["warnings"] if "report" in text]
-    assert len(told) == 1 and "a pilot chose" in told[0] and ("another scene" in told[0]) == bool(identity)
-    assert result.stats["quality"]["pilot_seconds"] > 0.1 and result.stats["error"] < 0.2
+    assert len(told) == 1 and "is not used" in told[0] and ("another scene" in told[0]) == bool(identity)
+    assert result.stats["quality"]["choice"] == "as set" and result.stats["error"] < 0.2
 
 
 def test_a_scene_stays_the_same_in_other_frames_sizes_and_settings() -> None:
@@ -139,34 +141,128 @@ def test_a_step_that_there_is_not_is_told() -> None:
         render(small(quality="SUPERB"))
 
 
-@pytest.mark.parametrize(
-    ("foretold", "looks"),
-    [((200.0, 30.0), [0.4, 1.6]), ((200.0,) * 4, [0.4, 1.6, 6.4, 11.6]), ((3.9,), [0.4]), ((np.inf,) * 4, [0.4, 1.6, 6.4, 21.6])],
-)  # fmt: skip
-def test_a_pilot_grows_as_long_as_what_it_foretells_is_worth_it(
-    foretold: tuple[float, ...], looks: list[float], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A look of a second foretold 214 s of a render of 29; a tenth of that was a pilot of 22 s."""
-    taken: list[float] = []
+class Pilot:
+    """In the place of Session: its report is told, what it was asked for is kept."""
 
-    class Look:
-        cancelled = False
+    asked: ClassVar[list[float]] = []
+    found: ClassVar[Report | Exception] = LookupError()
+    takes = 0.0  # seconds
+    cancelled = False
 
-        def __init__(self, scene: Scene, seconds: float, *_: object, **__: object) -> None:
-            taken.append(seconds)
+    def __init__(self, scene: Scene, seconds: float, watch: Any, **_: object) -> None:
+        self.asked.append(seconds)
+        self._watch = watch
 
-        def run(self) -> float:
-            return foretold[len(taken) - 1]
-
-    monkeypatch.setattr(quality, "Session", Look)
-    monkeypatch.setattr(quality, "choose", lambda told, step: quality.Choice("as set", seconds=told))
-    assert quality.pilot(small(), "GOOD").seconds == foretold[-1]
-    assert taken == pytest.approx(looks)
+    def run(self) -> Report:
+        time.sleep(self.takes)
+        if self._watch is not None and not self._watch(None):
+            self.cancelled = True
+            raise Cancelled
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found
 
 
-def test_cancelling_the_pilot_ends_the_render() -> None:
+@pytest.fixture
+def pilot(monkeypatch: pytest.MonkeyPatch) -> type[Pilot]:
+    """Flown however short the render."""
+    monkeypatch.setattr(quality, "Session", Pilot)
+    monkeypatch.setattr(quality, "LEAST_PILOT", 0.0)
+    monkeypatch.setattr(quality, "SEEN_SHARE", 0.0)
+    monkeypatch.setattr(Pilot, "asked", [])
+    monkeypatch.setattr(Pilot, "takes", 0.0)
+    return Pilot
+
+
+def test_a_short_render_flies_no_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It took 5 s where the picture as it is set took 2.5."""
+    made: list[object] = []
+    real = core.render.Renderer
+    monkeypatch.setattr(core.render, "Renderer", lambda *given: made.append(given) or real(*given))
+    stats = render(small(quality="PREVIEW")).stats
+    assert stats["quality"]["pilot_seconds"] == 0.0 and stats["quality"]["choice"] == "as set"
+    assert len(made) == 1 and stats["stopped_by"] == "error" and stats["error"] <= STEPS["PREVIEW"]
+
+
+def test_a_long_render_flies_a_pilot_of_a_tenth_and_goes_on(pilot: type[Pilot]) -> None:
+    """Nothing of the picture is lost, and the time of the pilot is not the picture's."""
+    pilot.found, pilot.takes = report(EXACT_ROW, row(AS_SET, 1.0)), 0.7
+    own = small(error_limit=STEPS["GOOD"])
+    own.settings.samples = UNLIMITED_SAMPLES
+    plain = render(own)
+    result = render(small(quality="GOOD"))
+    assert len(pilot.asked) == 1 and 0.0 < pilot.asked[0] < 0.2 * plain.stats["total_seconds"] + 0.5
+    assert np.array_equal(result.passes["Combined"], plain.passes["Combined"])
+    told = result.stats
+    assert "found nothing sooner" in told["quality"]["reason"]
+    assert told["quality"]["pilot_seconds"] >= 0.7 and told["quality"]["lost_seconds"] == 0.0
+    assert told["total_seconds"] - told["render_seconds"] > 0.69
+    assert told["error_asked"] == pytest.approx(STEPS["GOOD"])
+
+
+def test_a_bias_that_a_pilot_finds_leaves_less_room_for_noise(pilot: type[Pilot]) -> None:
+    pilot.found = report(EXACT_ROW, row(AS_SET, 1.0, bias=0.025))
+    stats = render(small(quality="GOOD")).stats
+    floor = pilot.found.rows[-1].floor
+    assert math.hypot(stats["error_asked"], floor.error) == pytest.approx(STEPS["GOOD"]) and floor.error > 0.0
+    assert stats["error"] <= stats["error_asked"]
+
+
+def test_a_bias_that_a_short_pilot_cannot_tell_from_noise_costs_no_samples(pilot: type[Pilot]) -> None:
+    """A pilot of 2 s could not rule out 3 %; a lamp that took 21 s took 29."""
+    unsure = replace(row(AS_SET, 1.0, bias=0.01), floor=Measured(1e-4, 5e-4))
+    pilot.found = report(EXACT_ROW, unsure)
+    assert unsure.floor.high > 0.03
+    assert render(small(quality="GOOD")).stats["error_asked"] == STEPS["GOOD"]
+
+
+def test_a_choice_that_is_sooner_begins_the_picture_anew(pilot: type[Pilot]) -> None:
+    pilot.found = report(EXACT_ROW, row(AS_SET, 1.0), row("1 bounce", 0.1, settings={"max_bounces": 1}))
+    result = render(small(quality="GOOD"))
+    told = result.stats["quality"]
+    assert told["choice"] == "1 bounce" and told["lost_seconds"] > 0.0
+    assert result.stats["total_seconds"] >= told["lost_seconds"] + result.stats["render_seconds"]
+    one = small(max_bounces=1, error_limit=STEPS["GOOD"])
+    one.settings.samples = UNLIMITED_SAMPLES
+    assert np.array_equal(result.passes["Combined"], render(one).passes["Combined"])
+
+
+def test_a_pilot_that_has_no_room_is_told_and_the_picture_goes_on(pilot: type[Pilot]) -> None:
+    pilot.found = MemoryError("it would take 40 GiB")
+    result = render(small(quality="GOOD"))
+    assert result.stats["stopped_by"] == "error"
+    assert [text for text in result.stats["warnings"] if "no room for a pilot" in text and "40 GiB" in text]
+
+
+def test_what_is_there_of_the_picture_counts_against_another_choice() -> None:
+    found = report(EXACT_ROW, row(AS_SET, 1.0), row("4 bounces", 0.6, settings={"max_bounces": 4}))
+    assert quality.choose(found, "GOOD").name == "4 bounces"
+    assert quality.choose(found, "GOOD", begun=0.6).name == AS_SET
+
+
+def test_settings_that_take_too_much_light_are_lifted_however_short_the_render() -> None:
+    """The error of a picture tells its noise alone; what clamping took shows in the picture's ledger."""
+    result = render(small(quality="PREVIEW", clamp_direct=0.05, clamp_indirect=0.05))
+    told = result.stats["quality"]
+    assert told["pilot_seconds"] > 0.0 and told["settings"]["clamp_direct"] == 0.0
+    assert result.stats["clamped_share"] == 0.0 and result.stats["error"] <= STEPS["PREVIEW"]
+
+
+def test_cancelling_ends_the_render_at_once() -> None:
     result = render(small(quality="HIGH"), progress=lambda progress: False)
     assert result.cancelled
+
+
+def test_cancelling_the_pilot_keeps_the_picture_so_far(pilot: type[Pilot]) -> None:
+    pilot.found = report(EXACT_ROW, row(AS_SET, 1.0))
+    steps: list[int] = []
+
+    def goes_on(told: Progress) -> bool:
+        steps.append(told.samples)
+        return not pilot.asked
+
+    result = render(small(quality="GOOD"), progress=goes_on)
+    assert result.cancelled and result.stats["samples"] == max(steps) > 0
 
 
 def test_the_dial_keeps_to_a_time_limit() -> None:
@@ -193,13 +289,12 @@ def test_without_the_library_the_render_goes_on_and_says_so(monkeypatch: pytest.
     assert result.stats["warnings"] == ["The picture is not denoised: Open Image Denoise is not here."]
 
 
-def test_what_a_pilot_builds_serves_the_render(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pilot_builds_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of its renders built anew: in a scene of 439,000 triangles a pilot took 8 s of 27."""
     made: list[object] = []
     real = core.render.Renderer
     monkeypatch.setattr(core.render, "Renderer", lambda *given: made.append(given) or real(*given))
-    scene = small()
-    scene.settings = replace(scene.settings, quality="DRAFT")
-    result = render(scene)
-    assert result.stats["quality"]["pilot_seconds"] > 0.0 and result.stats["reused"]
-    assert len(made) == 1 and result.stats["stopped_by"] == "error"
+    monkeypatch.setattr(quality, "LOST_SHARE", -1.0)
+    result = render(small(quality="DRAFT"))
+    assert result.stats["quality"]["pilot_seconds"] > 0.0
+    assert len(made) == 2 and result.stats["stopped_by"] == "error"
