@@ -22,7 +22,7 @@ from luch.cuda.device import DeviceError
 from luch.identity import identity_of
 from luch.kept import Kept
 from luch.report import files
-from luch.report.plan import EXACT, Variant, exact_settings
+from luch.report.plan import AS_SET, EXACT, Variant, exact_settings
 from luch.report.results import Report, Row
 from luch.report.schedule import Cancelled, Session, Told
 from luch.report.sentences import duration
@@ -68,6 +68,8 @@ def choose(report: Report, step: str, begun: float = 0.0) -> Choice:
     choice. Raises KeyError for a step that there is not.
     """
     error = STEPS[step]
+    if report.base != AS_SET and step != TAKES_NOTHING:
+        return as_set(step)  # which had no time to be measured: there is nothing that others could be sooner than
     base, exact = report.base_row, report.row(EXACT)
     rows = [row for row in report.choices if row.name != EXACT]
     if step == TAKES_NOTHING and exact is not None:

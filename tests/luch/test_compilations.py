@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import os
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -94,6 +96,20 @@ def test_kernels_beside_the_stages_are_compiled_ahead_for_all_that_moves_grows_a
         for curves in ("", *plan.CURVE_SHAPES):
             assert ready("TRACE_CWBVH", trace.ray_kernels("CWBVH", True, moves, curves)[0])
     assert not ready("TRACE_CWBVH", trace.TIMED_RAYS)
+
+
+def test_a_process_that_ends_waits_for_its_compiler() -> None:
+    """NVRTC in a thread that nobody waits for: "free(): invalid pointer" as the process ended."""
+    lines = (
+        "import time",
+        "from luch.cuda import compiler",
+        "compiler.compiled = lambda *asked: (time.sleep(0.5), print('compiled'))[0] or b''",
+        "compiler.compiling_scene('RENDER_STAGES', 'WATERTIGHT', 90, 'programs', ())",
+        "print('ends')",
+    )
+    ended = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True,
+                           env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})  # fmt: skip
+    assert ended.stdout.split() == ["ends", "compiled"] and ended.stderr == ""
 
 
 def test_scenes_that_differ_are_compiled_beside_each_other(slow: Compiler) -> None:

@@ -216,6 +216,12 @@ def test_a_bias_that_a_short_pilot_cannot_tell_from_noise_costs_no_samples(pilot
     assert render(small(quality="GOOD")).stats["error_asked"] == STEPS["GOOD"]
 
 
+def test_a_pilot_that_could_not_measure_the_scene_as_it_is_set_chooses_nothing() -> None:
+    """A room was begun anew with 64 bounces, "by the scene as it is set"."""
+    found = replace(report(EXACT_ROW), base=EXACT)
+    assert quality.choose(found, "GOOD") == quality.as_set("GOOD")
+
+
 def test_a_choice_that_is_sooner_begins_the_picture_anew(pilot: type[Pilot]) -> None:
     pilot.found = report(EXACT_ROW, row(AS_SET, 1.0), row("1 bounce", 0.1, settings={"max_bounces": 1}))
     result = render(small(quality="GOOD"))

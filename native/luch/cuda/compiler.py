@@ -157,7 +157,9 @@ class Compilation(threading.Thread):
 
     def __init__(self, asked: tuple[str, str, int, str, tuple[str, ...]]) -> None:
         """asked: of compiled()."""
-        super().__init__(name="Luch compiles kernels", daemon=True)
+        # A process that ends waits for it: NVRTC would go on while its library is taken down, and one in sixteen such
+        # processes broke off. What was compiled serves the next one.
+        super().__init__(name="Luch compiles kernels", daemon=False)
         self._asked = asked
         self.image: bytes | None = None
         self.failure: Exception | None = None
