@@ -158,7 +158,6 @@ class _Loop:
         self.cancelled = self.timed_out = False
         self._left_out = 0.0  # seconds
         self._exposure = scene.film.exposure
-        self._steering = Steering(self._lost, self._leave_out, self._ask)
         pixels = scene.film.pixels
         self._look_expected = LOOK_SECONDS * pixels / max(1, os.cpu_count() or 1) if settings.estimate_error else 0.0
         self._look_cost = self._look_expected  # of the last one
@@ -297,7 +296,7 @@ class _Loop:
                 asked_error=self.settings.error_limit,
                 forecast=self.curve.forecast(aim) if found else None,
                 curve=self.curve,
-                steering=self._steering,
+                steering=Steering(self._lost, self._leave_out, self._ask),  # kept by nobody: it holds this
             )
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import sys
 import time
@@ -116,6 +117,24 @@ def test_a_render_that_goes_on_is_told_of_building_then_of_samples() -> None:
 
 
 @pytest.mark.promise(5)
+def test_what_a_render_held_is_given_back_as_it_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not when Python next looks for cycles: a scene of some gigabytes would be there twice in the next frame."""
+    ended: list[str] = []
+
+    class Renderer(core.render.Renderer):
+        def __del__(self) -> None:
+            ended.append("given back")
+
+    monkeypatch.setattr(core.render, "Renderer", Renderer)
+    gc.collect()
+    gc.disable()
+    try:
+        render(heavy_scene(200), progress=lambda told: True)
+        assert ended == ["given back"]
+    finally:
+        gc.enable()
+
+
 def test_without_a_gpu_the_cpu_goes_on_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cupy", None)  # as where it is not installed
     device.cupy.cache_clear()
