@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -48,8 +49,9 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
         compiler, "scene_module", lambda image, device: SimpleNamespace(kernel=lambda name: (name, image))
     )
     monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: {"TIME": False})
-    monkeypatch.setattr(scene_kernels, "architecture_of", lambda module: 90)
-    monkeypatch.setattr(scene_kernels, "cupy", lambda: SimpleNamespace(cuda=SimpleNamespace(Device=lambda: SimpleNamespace(id=0))))  # fmt: skip
+    for user in (compiler, scene_kernels):
+        monkeypatch.setattr(user, "architecture_of", lambda module: 90)
+        monkeypatch.setattr(user, "cupy", lambda: SimpleNamespace(cuda=SimpleNamespace(Device=lambda: SimpleNamespace(id=0))))  # fmt: skip
     yield made
     made.may_end.set()
     assert compiler.quiet(30.0)
@@ -98,13 +100,33 @@ def test_kernels_beside_the_stages_are_compiled_ahead_for_all_that_moves_grows_a
     assert not ready("TRACE_CWBVH", trace.TIMED_RAYS)
 
 
+def test_who_cancels_does_not_wait_for_the_compiler(slow: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no general kernels are: as long as the scene's own take, seconds, nobody was asked."""
+    monkeypatch.setattr(compiler, "ahead", lambda *asked: None)
+    asked: list[float] = []
+
+    def goes_on() -> bool:
+        asked.append(time.perf_counter())
+        return len(asked) < 4
+
+    began = time.perf_counter()
+    with pytest.raises(compiler.NotWanted):
+        scene_kernels.SceneKernels(dict(FACTS), BLOCKS, Scene(), goes_on)
+    with pytest.raises(compiler.NotWanted):
+        compiler.load("TRACE_BVH2", "WATERTIGHT", (), goes_on)
+    assert len(asked) == 5 and time.perf_counter() - began < 0.5 + 5 * compiler.ASK_SECONDS
+    slow.may_end.set()
+    assert compiler.quiet(30.0)  # both went on
+    assert slow.calls == 2
+
+
 def test_a_process_that_ends_waits_for_its_compiler() -> None:
     """NVRTC in a thread that nobody waits for: "free(): invalid pointer" as the process ended."""
     lines = (
         "import time",
         "from luch.cuda import compiler",
         "compiler.compiled = lambda *asked: (time.sleep(0.5), print('compiled'))[0] or b''",
-        "compiler.compiling_scene('RENDER_STAGES', 'WATERTIGHT', 90, 'programs', ())",
+        "compiler.compiling('RENDER_STAGES', 'WATERTIGHT', 90, 'programs', ())",
         "print('ends')",
     )
     ended = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True,
@@ -113,12 +135,12 @@ def test_a_process_that_ends_waits_for_its_compiler() -> None:
 
 
 def test_scenes_that_differ_are_compiled_beside_each_other(slow: Compiler) -> None:
-    first, other = compiler.compiling_scene(*ASKED), compiler.compiling_scene(*ASKED[:3], "others", ())
-    assert first is not other and compiler.compiling_scene(*ASKED) is first
+    first, other = compiler.compiling(*ASKED), compiler.compiling(*ASKED[:3], "others", ())
+    assert first is not other and compiler.compiling(*ASKED) is first
     assert not compiler.quiet(0.0)
     slow.may_end.set()
     assert compiler.quiet(30.0) and first.image == other.image == b"own"
-    assert compiler.compiling_scene(*ASKED) is not first
+    assert compiler.compiling(*ASKED) is not first
 
 
 def test_kernels_that_do_not_compile_are_told_by_every_frame_that_wants_them(slow: Compiler) -> None:

@@ -255,5 +255,6 @@ def standing_in(folder: Path, shares_memory: bool = True) -> Iterator[None]:
 
 def forget() -> None:
     """What was loaded for the device so far."""
-    for cached in (device.cupy, device.available, compiler._loaded, compiler.scene_module):
+    for cached in (device.cupy, device.available):
         cached.cache_clear()
+    compiler.forget()

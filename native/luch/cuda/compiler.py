@@ -18,7 +18,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +28,8 @@ PACKAGE = Path(__file__).resolve().parents[1]
 # Scenes whose kernels stay on the device: some megabytes each.
 SCENES_KEPT = 8
 AHEAD = PACKAGE / "kernels"  # NAME.cubin, compiled by build.py
+_LOADED: dict[tuple[str, str, tuple[str, ...], int], Module] = {}  # as load() was asked, and the device
+ASK_SECONDS = 0.05  # between two questions of who waits for a compiler
 _COMPILING: dict[str, threading.Lock] = collections.defaultdict(threading.Lock)  # by name in the cache
 # NVRTC optimises the functions of a program on threads: half the time on two cores. Version 13.0 is the oldest tried.
 SPLITS_FROM, MOST_SPLIT = (13, 0), 8
@@ -90,19 +92,34 @@ def ahead_name(module: str, precision: str, architecture: int, defines: Sequence
     )
 
 
-def load(module: str, precision: str, defines: tuple[str, ...] = ()) -> Module:
+class NotWanted(Exception):
+    """Who waits for kernels wants them no more. The compiler goes on for who comes next: NVRTC's own way to stop it
+    breaks off in ptxas.
+    """
+
+
+def load(
+    module: str, precision: str, defines: tuple[str, ...] = (), goes_on: Callable[[], bool] | None = None
+) -> Module:
     """The module of kernels.json for the current device. Raises DeviceError if it does not compile.
 
-    defines: what it is compiled with beside, as "-DNAME=1".
+    defines: what it is compiled with beside, as "-DNAME=1"; goes_on: asked while it compiles; NotWanted where it says
+    no.
     """
-    return _loaded(module, precision, defines, int(cupy().cuda.Device().id))
+    asked = (module, precision, defines, int(cupy().cuda.Device().id))
+    if asked not in _LOADED:
+        architecture = architecture_of(cupy())
+        image = ahead(module, precision, architecture, defines) or kept(module, precision, architecture, "", defines)
+        if image is None:
+            image = compiling(module, precision, architecture, "", defines).wait(goes_on)
+        _LOADED[asked] = Module(image)
+    return _LOADED[asked]
 
 
-@functools.cache
-def _loaded(module: str, precision: str, defines: tuple[str, ...], device: int) -> Module:
-    architecture = architecture_of(cupy())
-    ready = ahead(module, precision, architecture, defines)
-    return Module(ready or compiled(module, precision, architecture, "", defines))
+def forget() -> None:
+    """What was loaded so far."""
+    _LOADED.clear()
+    scene_module.cache_clear()
 
 
 def _runs_on(architecture: int) -> list[int]:
@@ -175,14 +192,22 @@ class Compilation(threading.Thread):
         with _STARTING:
             del _UNDER_WAY[self._asked]
 
+    def wait(self, goes_on: Callable[[], bool] | None = None) -> bytes:
+        """What it compiles. Raises what it failed by, and NotWanted where goes_on, asked meanwhile, says no."""
+        while self.is_alive():
+            if goes_on is not None and not goes_on():
+                raise NotWanted
+            self.join(ASK_SECONDS)
+        if self.image is None:
+            raise self.failure or RuntimeError(f"{self.name}: nothing was compiled")
+        return self.image
+
 
 _UNDER_WAY: dict[tuple[str, str, int, str, tuple[str, ...]], Compilation] = {}
 _STARTING = threading.Lock()
 
 
-def compiling_scene(
-    module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]
-) -> Compilation:
+def compiling(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> Compilation:
     """compiled() on a thread, one however many renders ask for the same: an animation draws hundreds of frames
     while its kernels compile.
     """

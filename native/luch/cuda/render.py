@@ -18,7 +18,7 @@ import numpy as np
 
 from luch._native import core
 from luch.adaptive import parts, regions_of
-from luch.cuda.compiler import load
+from luch.cuda.compiler import NotWanted, load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.host import HostFilm, HostScene
 from luch.cuda.memory import NONE, RAY_CAMERA, Beside, Memory, bytes_per_path
@@ -117,7 +117,10 @@ class DeviceRenderer(HostFilm):
     def prepare_device(self) -> bool:
         """Uploads what the host has built, makes the kernels. False when cancelled. May raise TreesTooDeep."""
         with self._device:
-            return not self._cancelled and self._prepare()
+            try:
+                return not self._cancelled and self._prepare()
+            except NotWanted:
+                return False
 
     def set_view(self, scene: Any) -> bool:
         """As core.render.Renderer's. False: this view needs a renderer of its own."""
@@ -135,7 +138,10 @@ class DeviceRenderer(HostFilm):
             if not self._arrays.refresh(blocks, links):
                 return False
             if not self._stages.serve(facts, scene):
-                self._stages = SceneKernels(facts, blocks, scene)
+                try:
+                    self._stages = SceneKernels(facts, blocks, scene, self._goes_on)
+                except NotWanted:
+                    return False
             self._prepare_waves(facts)
             self._upload_seconds = time.perf_counter() - began
         return True
@@ -161,15 +167,18 @@ class DeviceRenderer(HostFilm):
         facts, blocks = self._upload()
         self._upload_seconds = time.perf_counter() - began
         precision, sampler = self._scene.settings.precision, sampler_flags(self._scene)
-        self._paths = load("RENDER_PATHS", precision, sampler)
+        self._paths = load("RENDER_PATHS", precision, sampler, self._goes_on)
         self._clocks = StageClocks()
-        self._stages = SceneKernels(facts, blocks, self._scene)
+        self._stages = SceneKernels(facts, blocks, self._scene, self._goes_on)
         self._walks = (
-            load("RENDER_WALKS", precision, MOVING * facts["moves"] + TIMED * self._timed + sampler)
+            load("RENDER_WALKS", precision, MOVING * facts["moves"] + TIMED * self._timed + sampler, self._goes_on)
             if facts["subsurface"]
             else None
         )
         self._prepare_waves(facts)
+        return not self._cancelled
+
+    def _goes_on(self) -> bool:
         return not self._cancelled
 
     def _prepare_waves(self, facts: dict[str, Any]) -> None:
@@ -207,7 +216,8 @@ class DeviceRenderer(HostFilm):
         self.warnings = _told_images([len(blocks[number][1]) for number in left_images])
         self._tracer = SceneTracer(tree_blocks, tree_links, facts["structure"], self._scene.settings.precision,
                                    facts["world_apart"], left, depth, facts["trees_move"],
-                                   self._scene.settings.curve_shape if facts["curves"] else "", self._timed)  # fmt: skip
+                                   self._scene.settings.curve_shape if facts["curves"] else "", self._timed,
+                                   self._goes_on)  # fmt: skip
         return facts, blocks
 
     def _images_to_leave(self, blocks: Blocks, tree_blocks: Blocks, left: Left) -> set[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,8 +55,11 @@ def sources_of(facts: dict[str, Any], blocks: list[tuple[str, Any]], scene: Scen
 class SceneKernels:
     """``kernel(name)`` is the best that is there at the moment; asked anew at every wave."""
 
-    def __init__(self, facts: dict[str, Any], blocks: list[tuple[str, Any]], scene: Scene) -> None:
-        """As sources_of()."""
+    def __init__(self, facts: dict[str, Any], blocks: list[tuple[str, Any]], scene: Scene,
+                 goes_on: Callable[[], bool] | None = None) -> None:  # fmt: skip
+        """As sources_of(). goes_on: asked while there is nothing but to wait for the compiler; NotWanted where it says
+        no.
+        """
         self._text, self._flags, self.plan, self._operations = sources_of(facts, blocks, scene)
         self._view = kind_of_view(scene)
         self._precision = scene.settings.precision
@@ -63,7 +67,7 @@ class SceneKernels:
         self._under_way: compiler.Compilation | None = None
         self.compile_seconds = 0.0
         self.general = False
-        self._start(facts)
+        self._start(facts, goes_on)
 
     def serve(self, facts: dict[str, Any], scene: Scene) -> bool:
         """Whether another view of the same scene needs the same code."""
@@ -74,7 +78,7 @@ class SceneKernels:
             self._view = view
         return True
 
-    def _start(self, facts: dict[str, Any]) -> None:
+    def _start(self, facts: dict[str, Any], goes_on: Callable[[], bool] | None) -> None:
         architecture = architecture_of(cupy())
         kept = compiler.kept(STAGES, self._precision, architecture, self._text, self._flags)
         if kept is not None:
@@ -88,21 +92,20 @@ class SceneKernels:
         if general is not None:
             self._module, self.general = self._loaded(general), True
         elif self._under_way is not None:
-            self._under_way.join()
-            self._take()
+            self._take(goes_on)
 
     def _compile(self, architecture: int) -> None:
-        self._under_way = compiler.compiling_scene(STAGES, self._precision, architecture, self._text, self._flags)
+        self._under_way = compiler.compiling(STAGES, self._precision, architecture, self._text, self._flags)
 
-    def _take(self) -> None:
+    def _take(self, goes_on: Callable[[], bool] | None) -> None:
+        """The scene's own, which are waited for where they still compile."""
         compilation = self._under_way
-        if compilation is None or compilation.is_alive():
-            return
-        if compilation.image is None:
-            raise DeviceError(
-                f"The kernels of this scene do not compile: {compilation.failure}"
-            ) from compilation.failure
-        self._module, self._under_way, self.general = self._loaded(compilation.image), None, False
+        assert compilation is not None
+        try:
+            image = compilation.wait(goes_on)
+        except DeviceError as failure:
+            raise DeviceError(f"The kernels of this scene do not compile: {failure}") from failure
+        self._module, self._under_way, self.general = self._loaded(image), None, False
         self.compile_seconds = compilation.seconds
 
     def _loaded(self, image: bytes) -> Module:
@@ -111,6 +114,7 @@ class SceneKernels:
 
     def kernel(self, name: str) -> Kernel:
         """Between two waves the scene's own kernels take over from the general ones: the same results."""
-        self._take()
+        if self._under_way is not None and not self._under_way.is_alive():
+            self._take(None)
         assert self._module is not None
         return self._module.kernel(name)

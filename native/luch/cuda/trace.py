@@ -59,17 +59,19 @@ class SceneTracer:
     """A scene's trees on the current device, and their kernels."""
 
     def __init__(self, blocks: Blocks, links: Links, kind: str, precision: str, world_apart: bool, left: Left = (),
-                 depth: int = 0, moves: bool = False, curves: str = "", timed: bool = False) -> None:  # fmt: skip
+                 depth: int = 0, moves: bool = False, curves: str = "", timed: bool = False,
+                 goes_on: Callable[[], bool] | None = None) -> None:  # fmt: skip
         """blocks, links: cpu::SceneTrees::append's. kind: a structure, as "CWBVH". precision: what it was built for.
 
         world_apart: one group is all of the scene, or all that stands still where the rest moves; left: groups that the
         device builds, if any; depth: of the trees that were built; moves: something in them does; curves: the
         Settings.curve_shape of the hair that some group holds, "" without; timed: `ticks` of closest() and any() are
-        written. Kernels lack the code of what is not asked for. May raise TreesTooDeep.
+        written. Kernels lack the code of what is not asked for. goes_on: as in luch.cuda.compiler.load. May raise
+        TreesTooDeep.
         """
         self._trees = upload_trees(blocks, links, left, depth)
         flags, one = ray_kernels(kind, world_apart, moves, curves, timed)
-        self._module = load(f"TRACE_{kind}", precision, flags)
+        self._module = load(f"TRACE_{kind}", precision, flags, goes_on)
         self._closest, self._any = self.kernel(f"trace_closest{one}"), self.kernel(f"trace_any{one}")
         # What moves comes after what stands still, which is found as if nothing moved.
         self._then: dict[str, Kernel] = {}
