@@ -95,7 +95,8 @@ def choose(report: Report, step: str, begun: float = 0.0) -> Choice:
 def as_set(step: str, changes: dict[str, Any] | None = None) -> Choice:
     """Where nothing is known, or nothing is worth finding out."""
     wanted = {**(changes or {}), "error_limit": STEPS[step], "samples": UNLIMITED_SAMPLES}
-    return Choice("as set", wanted, f"{step.capitalize()}: {percent(STEPS[step])} % by the scene as it is set")
+    name, told = (EXACT, f'"{EXACT}"') if changes else (AS_SET, "the scene as it is set")
+    return Choice(name, wanted, f"{step.capitalize()}: {percent(STEPS[step])} % by {told}")
 
 
 def _bias(row: Row, report: Report) -> float:
@@ -165,11 +166,8 @@ class _Dial:
             self._looked = True
             if told.steering.lost() > LOST_SHARE * STEPS[self._step]:
                 return max(LEAST_LOOK, seconds)
-        return (
-            seconds
-            if seconds >= LEAST_PILOT and told.seconds >= SEEN_SHARE * min(left, MOST_PILOT / PILOT_SHARE)
-            else 0.0
-        )
+        seen = told.seconds >= SEEN_SHARE * min(left, MOST_PILOT / PILOT_SHARE)
+        return seconds if seconds >= LEAST_PILOT and seen else 0.0
 
     def _fly(self, told: Progress, seconds: float, left: float) -> bool:
         """Whether the picture goes on."""
@@ -187,12 +185,14 @@ class _Dial:
         self.seconds = time.perf_counter() - began
         told.steering.leave_out(self.seconds)
         if session.cancelled or report is None:
+            self.kept.drop()
             return not session.cancelled
         choice = choose(report, self._step, told.seconds / (told.seconds + left))
         if choice.settings.keys() == {"error_limit", "samples"}:
             told.steering.ask(choice.settings["error_limit"])
             found = f"{as_set(self._step).reason}; a pilot of {duration(self.seconds)} found nothing sooner"
             self.choice = replace(choice, reason=found)
+            self.kept.drop()  # the picture has a renderer of its own
         else:
             self.better = choice
         return self.better is None

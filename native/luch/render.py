@@ -177,7 +177,7 @@ class _Loop:
 
     def _ask(self, error: float) -> None:
         self.settings = replace(self.settings, error_limit=error)
-        self.stopping.error, self.stopping.settled = error, 0
+        self.stopping.ask(error, self.curve)
 
     def prepare(self) -> None:
         """Structures and lights."""

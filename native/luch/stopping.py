@@ -76,6 +76,11 @@ class Stopping:
         room = MOST_OVER * math.exp(-LOOKS_LUCK * spread)
         return self.error * min(NEAREST_AIM, max(FARTHEST_AIM, room))
 
+    def ask(self, error: float, curve: Curve) -> None:
+        """For another error from now on, which the picture may have reached already, or no more."""
+        self.error, self.settled, self.reached = error, 0, False
+        self.look(curve)
+
     def look(self, curve: Curve) -> bool:
         """Whether the error asked for is reached. To be called after every point of the curve."""
         found = curve.last

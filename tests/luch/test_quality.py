@@ -271,6 +271,12 @@ def test_cancelling_the_pilot_keeps_the_picture_so_far(pilot: type[Pilot]) -> No
     assert result.cancelled and result.stats["samples"] == max(steps) > 0
 
 
+def test_a_reference_takes_nothing_from_the_light_and_says_so() -> None:
+    told = render(small(quality="REFERENCE", time_limit=0.5, clamp_indirect=2.0)).stats["quality"]
+    assert told["choice"] == EXACT and told["settings"]["clamp_indirect"] == 0.0 and told["pilot_seconds"] == 0.0
+    assert told["reason"] == 'Reference: 0.50 % by "exact"'
+
+
 def test_the_dial_keeps_to_a_time_limit() -> None:
     result = render(small(quality="REFERENCE", time_limit=1.5))
     assert result.stats["total_seconds"] < 3.0

@@ -63,6 +63,17 @@ def test_an_error_out_of_reach_ends_with_the_samples() -> None:
     assert samples == synthetic.MOST and not stopping.reached
 
 
+def test_another_error_may_be_asked_for_on_the_way() -> None:
+    """One that the picture has reached already, or one that takes it on."""
+    picture = synthetic.Picture(synthetic.normal, np.random.default_rng(0))
+    _, stopping, curve = picture.rendered_to(0.08)
+    assert stopping.reached
+    stopping.ask(0.04, curve)
+    assert not stopping.reached and stopping.error == 0.04
+    stopping.ask(0.1, curve)
+    assert stopping.reached
+
+
 def test_looks_are_fixed_beforehand() -> None:
     looks, stopping = [0], Stopping(samples=200)
     while looks[-1] < 200:

@@ -170,7 +170,7 @@ def compiled(module: str, precision: str, architecture: int, programs: str, defi
 
 
 class Compilation(threading.Thread):
-    """A scene's own kernels on their way, while general ones render it."""
+    """Kernels on their way: a scene's own while general ones render it, or such as somebody waits for."""
 
     def __init__(self, asked: tuple[str, str, int, str, tuple[str, ...]]) -> None:
         """asked: of compiled()."""

@@ -103,7 +103,9 @@ class SceneKernels:
         assert compilation is not None
         try:
             image = compilation.wait(goes_on)
-        except DeviceError as failure:
+        except compiler.NotWanted:
+            raise
+        except Exception as failure:  # whatever it was, of the compiler's thread
             raise DeviceError(f"The kernels of this scene do not compile: {failure}") from failure
         self._module, self._under_way, self.general = self._loaded(image), None, False
         self.compile_seconds = compilation.seconds
