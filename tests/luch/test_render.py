@@ -116,7 +116,6 @@ def test_a_render_that_goes_on_is_told_of_building_then_of_samples() -> None:
     assert told[-1].samples == 4
 
 
-@pytest.mark.promise(5)
 def test_what_a_render_held_is_given_back_as_it_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not when Python next looks for cycles: a scene of some gigabytes would be there twice in the next frame."""
     ended: list[str] = []
@@ -135,6 +134,7 @@ def test_what_a_render_held_is_given_back_as_it_ends(monkeypatch: pytest.MonkeyP
         gc.enable()
 
 
+@pytest.mark.promise(5)
 def test_without_a_gpu_the_cpu_goes_on_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cupy", None)  # as where it is not installed
     device.cupy.cache_clear()
