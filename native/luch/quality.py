@@ -133,17 +133,32 @@ class _Dial:
         self._scene, self._step, self._progress = scene, step, progress
         takes_nothing = step == TAKES_NOTHING
         self.choice = as_set(step, exact_settings(scene.settings) if takes_nothing else None)
-        self.better: Choice | None = None  # the picture is to begin anew
-        self.seconds = 0.0  # of the pilot
+        self.pilot_seconds = self.lost_seconds = 0.0  # lost: of a picture that began anew
         self.warnings: list[str] = []
-        self.kept = Kept()  # what the pilot has built
+        self._better: Choice | None = None  # the picture is to begin anew
+        self._kept = Kept()  # what the pilot has built
         # Another choice would be the halves' own; nothing is to be chosen where nothing may be taken.
         self._decided = takes_nothing or scene.settings.verify
         self._looked = False
         self._start = time.perf_counter()
 
-    def watch(self, told: Progress) -> bool:
-        """For render()."""
+    def rendered(self, render: Render) -> Result:
+        """The picture, in the end by self.choice."""
+        settings = self._scene.settings
+        result = render(replace(self._scene, settings=_changed(settings, self.choice)), progress=self._watch)
+        if self._better is None:
+            return result
+        spent = time.perf_counter() - self._start
+        self.choice, self.lost_seconds = self._better, spent - self.pilot_seconds
+        changed = _changed(settings, self.choice)
+        if changed.time_limit > 0.0:
+            changed.time_limit = max(1e-3, changed.time_limit - spent)
+        del result  # its renderer's memory
+        result = render(replace(self._scene, settings=changed), progress=self._progress, kept=self._kept)
+        result.stats["total_seconds"] += spent
+        return result
+
+    def _watch(self, told: Progress) -> bool:
         if self._progress is not None and not self._progress(told):
             return False
         if self._decided or not told.new_picture or told.curve is None or not told.curve.points:
@@ -174,7 +189,7 @@ class _Dial:
         assert told.steering is not None
         self._decided = True
         began = time.perf_counter()
-        session = Session(self._scene, seconds, self._told_on(told), **self._variants(seconds), kept=self.kept)
+        session = Session(self._scene, seconds, self._told_on(told), **self._variants(seconds), kept=self._kept)
         report = None
         try:
             report = session.run()
@@ -182,20 +197,20 @@ class _Dial:
             pass  # not even one choice in time, or the user's word: both are looked at below
         except (DeviceError, MemoryError) as error:
             self.warnings.append(f"No settings were chosen, there is no room for a pilot beside the picture: {error}")
-        self.seconds = time.perf_counter() - began
-        told.steering.leave_out(self.seconds)
+        self.pilot_seconds = time.perf_counter() - began
+        told.steering.leave_out(self.pilot_seconds)
         if session.cancelled or report is None:
-            self.kept.drop()
+            self._kept.drop()
             return not session.cancelled
         choice = choose(report, self._step, told.seconds / (told.seconds + left))
         if choice.settings.keys() == {"error_limit", "samples"}:
             told.steering.ask(choice.settings["error_limit"])
-            found = f"{as_set(self._step).reason}; a pilot of {duration(self.seconds)} found nothing sooner"
+            found = f"{as_set(self._step).reason}; a pilot of {duration(self.pilot_seconds)} found nothing sooner"
             self.choice = replace(choice, reason=found)
-            self.kept.drop()  # the picture has a renderer of its own
+            self._kept.drop()  # the picture has a renderer of its own
         else:
-            self.better = choice
-        return self.better is None
+            self._better = choice
+        return self._better is None
 
     def _variants(self, seconds: float) -> dict[str, Any]:
         if seconds < LEAST_PILOT:
@@ -221,35 +236,17 @@ def rendered(scene: Scene, render: Render, progress: Watch | None) -> Result:
     if report is not None:
         choice = choose(report, settings.quality)
         result = render(replace(scene, settings=_changed(settings, choice)), progress=progress)
-        seconds = {"pilot_seconds": 0.0, "lost_seconds": 0.0}
+        pilot_seconds = lost_seconds = 0.0
     else:
-        result, choice, seconds, more = _steered(scene, render, progress)
-        warnings = [*warnings, *more]
+        dial = _Dial(scene, settings.quality, progress)
+        result = dial.rendered(render)
+        choice, pilot_seconds, lost_seconds = dial.choice, dial.pilot_seconds, dial.lost_seconds
+        warnings = [*warnings, *dial.warnings]
     result.stats["quality"] = {"step": settings.quality, "choice": choice.name, "settings": choice.settings,
-                               "reason": choice.reason, **seconds}  # fmt: skip
+                               "reason": choice.reason, "pilot_seconds": pilot_seconds,
+                               "lost_seconds": lost_seconds}  # fmt: skip
     result.stats["warnings"] = [*result.stats.get("warnings", []), *warnings]
     return result
-
-
-def _steered(
-    scene: Scene, render: Render, progress: Watch | None
-) -> tuple[Result, Choice, dict[str, float], list[str]]:
-    """Begun as it is set; its picture, by which choice, what the choice cost, and warnings."""
-    settings, start = scene.settings, time.perf_counter()
-    dial = _Dial(scene, settings.quality, progress)
-    result = render(replace(scene, settings=_changed(settings, dial.choice)), progress=dial.watch)
-    seconds = {"pilot_seconds": dial.seconds, "lost_seconds": 0.0}
-    if dial.better is None:
-        return result, dial.choice, seconds, dial.warnings
-    spent = time.perf_counter() - start
-    seconds["lost_seconds"] = spent - dial.seconds
-    changed = _changed(settings, dial.better)
-    if changed.time_limit > 0.0:
-        changed.time_limit = max(1e-3, changed.time_limit - spent)
-    del result  # its renderer's memory
-    result = render(replace(scene, settings=changed), progress=progress, kept=dial.kept)
-    result.stats["total_seconds"] += spent
-    return result, dial.better, seconds, dial.warnings
 
 
 def _changed(settings: Settings, choice: Choice) -> Settings:

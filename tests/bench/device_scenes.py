@@ -123,18 +123,14 @@ def luch(options: argparse.Namespace) -> int:
 
 def _general_over_own(run: Callable[[int], Any]) -> float | None:
     """Seconds of the general kernels over those of the scene's own. None: no general ones, or a scene that needs more."""
-    from unittest import mock
-
-    from luch.cuda import compiler
-    from luch.cuda.scene_kernels import SceneKernels
+    from support.general_kernels import general_kernels_alone
 
     def seconds() -> tuple[float, bool]:
         one, many = run(1).stats, run(GENERAL_SAMPLES).stats
         return many["render_seconds"] - one["render_seconds"], many["kernels"] == "general"
 
     own = seconds()[0]
-    nothing = mock.patch.object(compiler, "kept", return_value=None)
-    with nothing, mock.patch.object(SceneKernels, "_compile"), mock.patch.object(SceneKernels, "_take"):
+    with general_kernels_alone():
         try:
             general, real = seconds()
         except (AssertionError, AttributeError):  # no kernels at all: the scene needs its own

@@ -15,7 +15,7 @@ from luch._native import core
 from luch.cuda import compiler, device, several
 from luch.cuda import render as device_render
 from luch.cuda.render import DeviceRenderer
-from luch.cuda.scene_kernels import STAGES, SceneKernels
+from luch.cuda.scene_kernels import STAGES
 from luch.kept import Kept
 from luch.render import Progress, render
 from luch.scene import Image, Instances, Light, Material, Scene
@@ -25,6 +25,7 @@ from support.cuda_on_cpu import FIBERS
 from support.devices import both, check_equal
 from support.effects import closure, program
 from support.everything import everything
+from support.general_kernels import general_kernels_alone
 
 LIGHT_PASSES = ["Emission", "Environment", "Ambient Occlusion", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color",
                 "Glossy Direct", "Glossy Indirect", "Glossy Color", "Transmission Direct", "Transmission Indirect",
@@ -339,23 +340,22 @@ def test_kernels_of_any_two_effects_draw_what_general_ones_do(place: str, effect
 
 @pytest.mark.cuda
 @pytest.mark.parametrize("effects", covering_rows(), ids=lambda row: f"{len(row)} effects")
-def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(
-    place: str, effects: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(place: str, effects: tuple[str, ...]) -> None:
     """Which interpret programs, and hold all that any scene may need."""
     if place == FIBERS:
-        pytest.skip("on a GPU alone")
+        pytest.skip("on a GPU alone")  # it is nvcc's machine code that is held against NVRTC's
     architecture = device.architecture_of(device.cupy())
     if compiler.ahead(STAGES, "WATERTIGHT", architecture, compiler.ready_made(STAGES)[0]) is None:
+        # Only with them in place, which the other tests must not have: scenes this small would end before their own
+        # kernels are there. tests/bench/records/cuda-tests.json says when it ran.
         pytest.skip("build.py build --cuda was not run")
     scene = scene_of(effects)
     scene.settings.device = "CUDA"
     with pytest.MonkeyPatch.context() as apart:
         apart.setattr(compiler, "ready_made", lambda module: [("-DLUCH_NEVER_COMPILED=1",)])
         own = render(scene)
-    monkeypatch.setattr(compiler, "kept", lambda *asked: None)
-    monkeypatch.setattr(SceneKernels, "_compile", lambda self, architecture: None)
-    general = render(scene)
+    with general_kernels_alone():
+        general = render(scene)
     assert (own.stats["kernels"], general.stats["kernels"]) == ("the scene's own", "general")
     for name, image in own.passes.items():
         assert np.array_equal(image.view(np.uint32), general.passes[name].view(np.uint32)), name

@@ -8,7 +8,6 @@ ahead of time lies in luch/kernels and is taken first; its key leaves out the co
 
 from __future__ import annotations
 
-import collections
 import ctypes
 import functools
 import hashlib
@@ -30,7 +29,6 @@ SCENES_KEPT = 8
 AHEAD = PACKAGE / "kernels"  # NAME.cubin, compiled by build.py
 _LOADED: dict[tuple[str, str, tuple[str, ...], int], Module] = {}  # as load() was asked, and the device
 ASK_SECONDS = 0.05  # between two questions of who waits for a compiler
-_COMPILING: dict[str, threading.Lock] = collections.defaultdict(threading.Lock)  # by name in the cache
 # NVRTC optimises the functions of a program on threads: half the time on two cores. Version 13.0 is the oldest tried.
 SPLITS_FROM, MOST_SPLIT = (13, 0), 8
 SCENE_PROGRAMS = "luch_scene_programs.cuh"  # the header that a scene's own kernels include
@@ -159,14 +157,12 @@ def kept(module: str, precision: str, architecture: int, programs: str, defines:
 def compiled(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes:
     """Machine code (PTX where NVRTC is older than the device) out of the cache, or compiled now and kept there.
 
-    programs: a scene's, luch.cuda.programs.source; "": none. Several devices of one kind wait for one compiler.
+    programs: a scene's, luch.cuda.programs.source; "": none. Who renders asks for compiling(), so that nothing is compiled twice at once.
     """
     from cupy.cuda import nvrtc
 
     unit = _Unit(module, precision, architecture, programs, tuple(defines))
-    name = _cache_name(nvrtc, unit)
-    with _COMPILING[name]:
-        return _kept(name) or _compile_and_keep(nvrtc, unit)
+    return _kept(_cache_name(nvrtc, unit)) or _compile_and_keep(nvrtc, unit)
 
 
 class Compilation(threading.Thread):
