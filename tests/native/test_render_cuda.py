@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from luch import samplers
 from luch._native import core
 from luch.cuda import compiler, device, several
 from luch.cuda import render as device_render
@@ -339,8 +340,14 @@ def test_kernels_of_any_two_effects_draw_what_general_ones_do(place: str, effect
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("effects", covering_rows(), ids=lambda row: f"{len(row)} effects")
-def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(place: str, effects: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    "number, effects",
+    enumerate(covering_rows()),
+    ids=lambda row: f"{len(row)} effects" if isinstance(row, tuple) else "",
+)
+def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(
+    place: str, number: int, effects: tuple[str, ...]
+) -> None:
     """Which interpret programs, and hold all that any scene may need."""
     if place == FIBERS:
         pytest.skip("on a GPU alone")  # it is nvcc's machine code that is held against NVRTC's
@@ -350,7 +357,7 @@ def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(place: str, 
         # kernels are there. tests/bench/records/cuda-tests.json says when it ran.
         pytest.skip("build.py build --cuda was not run")
     scene = scene_of(effects)
-    scene.settings.device = "CUDA"
+    scene.settings.device, scene.settings.sampler = "CUDA", samplers.NAMES[number % len(samplers.NAMES)]
     with pytest.MonkeyPatch.context() as apart:
         apart.setattr(compiler, "ready_made", lambda module: [("-DLUCH_NEVER_COMPILED=1",)])
         own = render(scene)

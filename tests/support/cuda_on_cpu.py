@@ -135,6 +135,15 @@ def compiles(text: str, include: list[Path], defines: Sequence[str]) -> bool:
     return subprocess.run(command, input=whole, text=True).returncode == 0
 
 
+def library(text: str, folder: Path, include: list[Path], defines: Sequence[str]) -> ctypes.CDLL:
+    """Device code, as it is compiled for a GPU but with `defines`: its functions that are extern "C"."""
+    source, built = folder / "library.cpp", folder / "library.so"
+    source.write_text(f'#include "{HERE / "cuda_on_cpu.h"}"\n{text}')
+    options = ["-DLUCH_PRECISION=WATERTIGHT", *(f"-I{path}" for path in include), *defines]
+    subprocess.run(["c++", *FLAGS, *options, str(source), "-o", str(built)], check=True)
+    return ctypes.CDLL(str(built))
+
+
 def _types(parameters: str) -> list[str]:
     """Of a kernel's parameters, as they stand in its source."""
     words = [

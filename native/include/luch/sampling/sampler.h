@@ -64,38 +64,30 @@ LUCH_FN void with_family(SamplerFamily family, Work&& work) {
     }
 }
 
-#if !LUCH_CUDA
 // Apart, so that the default's calls stay as small as they are.
 LUCH_FN_APART Vec3 sample_other(const Sampler& s, u32 dimension) {
     // x and y of three coordinates are those of two, and x is that of one.
     return family_of(dimension) == SamplerFamily::INDEPENDENT ? independent_3d(s, dimension) : lattice_3d(s, dimension);
 }
-#endif
 
 LUCH_FN float sample_1d(const Sampler& s, u32 dimension) {
     if constexpr (plan::SAMPLER != plan::ANY_SAMPLER) return sample_1d_of<SamplerFamily(plan::SAMPLER)>(s, dimension);
-#if !LUCH_CUDA
     if (family_of(dimension) != SamplerFamily::SOBOL) return sample_other(s, dimension).x;
-#endif
     return sobol_1d(s, dimension);
 }
 
 LUCH_FN Vec2 sample_2d(const Sampler& s, u32 dimension) {
     if constexpr (plan::SAMPLER != plan::ANY_SAMPLER) return sample_2d_of<SamplerFamily(plan::SAMPLER)>(s, dimension);
-#if !LUCH_CUDA
     if (family_of(dimension) != SamplerFamily::SOBOL) {
         Vec3 u = sample_other(s, dimension);
         return {u.x, u.y};
     }
-#endif
     return sobol_2d(s, dimension);
 }
 
 LUCH_FN Vec3 sample_3d(const Sampler& s, u32 dimension) {
     if constexpr (plan::SAMPLER != plan::ANY_SAMPLER) return sample_3d_of<SamplerFamily(plan::SAMPLER)>(s, dimension);
-#if !LUCH_CUDA
     if (family_of(dimension) != SamplerFamily::SOBOL) return sample_other(s, dimension);
-#endif
     return sobol_3d(s, dimension);
 }
 
