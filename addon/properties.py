@@ -42,6 +42,12 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
     gpus: IntProperty(
         name="GPUs", default=0, min=0, max=64, description="How many GPUs share the samples; 0 for all that there are"
     )
+    own_kernels: BoolProperty(
+        name="Kernels for the Scene",
+        default=True,
+        description="Compile kernels that hold only what the scene calls for, while general ones begin it; off: the general "
+        "ones alone, which draw the same picture more slowly",
+    )
     accelerator: EnumProperty(
         name="Structure",
         items=[

@@ -49,6 +49,7 @@ def export_settings(context: ExportContext) -> Settings:
         precision=scene.luch.precision,
         device=scene.luch.device,
         gpus=scene.luch.gpus,
+        own_kernels=scene.luch.own_kernels,
         texture_memory=scene.luch.texture_memory,
         estimate_error=scene.luch.estimate_error,
         verify=scene.luch.verify,

@@ -160,7 +160,7 @@ class LUCH_RENDER_PT_performance(LuchPanel, bpy.types.Panel):
             self.layout,
             scene,
             "device",
-            *(("gpus", "texture_memory") if scene.luch.device == "CUDA" else ()),
+            *(("gpus", "texture_memory", "own_kernels") if scene.luch.device == "CUDA" else ()),
             "accelerator",
             "precision",
             "threads",

@@ -82,6 +82,8 @@ def _parser() -> argparse.ArgumentParser:
         help="simulate an effect that the scene lacks; ALL: every one",
     )
     render.add_argument("--gpus", type=_positive(int), help="how many GPUs share the samples (default: all)")
+    render.add_argument("--general-kernels", action="store_true",
+                        help="on GPUs: compile none for the scene where those for all scenes serve")  # fmt: skip
     render.add_argument("--threads", type=int, help="0: one per processor")
     render.add_argument("--adaptive", action="store_true", help="until that error: more samples where the error is")
     render.add_argument("--mergeable", action="store_true", help="keep the film's sums in the .exr, for `merge`")
@@ -244,6 +246,7 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
         settings.threads = options.threads
     if options.gpus is not None:
         settings.gpus = options.gpus
+    settings.own_kernels = settings.own_kernels and not options.general_kernels
     if options.without_effect:
         settings.without_effects = options.without_effect
     if options.force_effect:
@@ -289,7 +292,8 @@ class _Line:
             return
         self._next = now + 0.25
         if progress.preparing:
-            self._write("building structures and lights")
+            doing = "compiling kernels for this GPU" if progress.compiling else "building structures and lights"
+            self._write(doing)
             return
         error = f", error {percent(progress.error)} %" if progress.error is not None else ""
         left = f", {progress.remaining_seconds:.0f} s left" if np.isfinite(progress.remaining_seconds) else ""

@@ -49,6 +49,7 @@ PATIENCE = 4.0  # a look may take so many times as long where a busy machine nee
 SOONER = 0.85  # of the time as the scene is set: a choice that gains less is not worth other settings
 BIAS_SHARE = 0.7  # of the error asked for, that bias may make up
 FILTERED_RESERVE = 1.2  # of the samples that a denoised picture is foretold to need
+WAIT = frozenset({"precision"})  # settings that a GPU's general kernels do not serve
 CHOICES = frozenset({"denoised", "clamp indirect 10", "clamp indirect 1", "4 bounces", "clamp 10, filter 1, 4 bounces",
                      "no light tree", "light tree", "fast precision"})  # fmt: skip
 
@@ -189,7 +190,7 @@ class _Dial:
         assert told.steering is not None
         self._decided = True
         began = time.perf_counter()
-        session = Session(self._scene, seconds, self._told_on(told), **self._variants(seconds), kept=self._kept)
+        session = Session(self._to_try(), seconds, self._told_on(told), **self._variants(seconds), kept=self._kept)
         report = None
         try:
             report = session.run()
@@ -212,10 +213,18 @@ class _Dial:
             self._better = choice
         return self._better is None
 
+    def _to_try(self) -> Scene:
+        """On a GPU by general kernels: choices have others, which would take longer to compile than a pilot lasts."""
+        settings = self._scene.settings
+        if settings.device == "CPU":
+            return self._scene
+        return replace(self._scene, settings=replace(settings, own_kernels=False))
+
     def _variants(self, seconds: float) -> dict[str, Any]:
         if seconds < LEAST_PILOT:
             return {"only": lambda variant: variant.rank == 0, "rounds": 2, "patience": PATIENCE}
-        return {"only": _worth_trying}
+        skipped = WAIT if self._scene.settings.device == "CUDA" else frozenset()
+        return {"only": lambda variant: _worth_trying(variant) and not variant.settings.keys() & skipped}
 
     def _told_on(self, told: Progress) -> Callable[[Told], bool] | None:
         progress = self._progress

@@ -71,6 +71,7 @@ class Progress:
     forecast: Forecast | None = None  # of the error asked for, else of the next round one
     curve: Curve | None = None
     preparing: bool = False  # structures and lights are being built; no sample was traced yet
+    compiling: bool = False  # what is waited for then is the compiler of a GPU's kernels
     steering: Steering | None = None  # None while preparing
 
 
@@ -183,7 +184,10 @@ class _Loop:
         """Structures and lights."""
 
         def goes_on() -> bool:
-            return self.progress is None or self.progress(preparing(self.stopping.samples, self.start))
+            if self.progress is None:
+                return True
+            compiling = getattr(self.renderer, "compiling", False)  # the CPU has no kernels
+            return self.progress(replace(preparing(self.stopping.samples, self.start), compiling=compiling))
 
         self.cancelled = not watched(
             self.renderer.prepare, self.renderer, goes_on, watch_seconds=self.pace.watch_seconds
@@ -200,9 +204,15 @@ class _Loop:
     def run(self) -> None:
         """Until a limit is reached or the caller says no. There is at least one sample, however short the time."""
         while self.done < self.stopping.samples and not (self.cancelled or self.timed_out or self.stopping.reached):
-            self._step(_next_count(self.done, self.stopping.next_look(self.done), self.seconds))
+            self._step(_next_count(self.done, self._next_stop(), self.seconds))
         self.render_seconds = self.seconds
         self._look(last=True)
+
+    def _next_stop(self) -> int:
+        """Samples that no step goes beyond."""
+        if self.settings.estimate_error:
+            return self.stopping.next_look(self.done)
+        return min(1 << self.done.bit_length(), self.stopping.samples)
 
     def _step(self, count: int) -> None:
         first = self.done

@@ -338,6 +338,9 @@ class Settings:
     device: str = "CPU"  # or "CUDA"
     texture_memory: float = 0.0  # MB of images on each GPU, 0: what fits; the rest is read from the host's memory
     gpus: int = 0  # how many of the CUDA devices that are visible, 0: all
+    # CUDA: kernels are compiled for the scene while those for all scenes begin it. False: the latter alone, where they
+    # serve; the same picture, more slowly.
+    own_kernels: bool = True
     # To see what an effect (luch.effects) costs: left out of the picture; simulated though the scene lacks it. ["ALL"]
     # forces every effect that can be.
     without_effects: list[str] = field(default_factory=list)

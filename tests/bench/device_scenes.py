@@ -92,8 +92,9 @@ def luch(options: argparse.Namespace) -> int:
         film = replace(scene.film, passes=["Combined"])
         large = replace(film, width=film.width * SIDES, height=film.height * SIDES)
 
-        def run(samples: int, film: Any = large, scene: Any = scene, seed: int = SEED) -> Any:
-            settings = replace(scene.settings, samples=samples, device="CUDA", time_limit=0.0, seed=seed)
+        def run(samples: int, film: Any = large, scene: Any = scene, seed: int = SEED, own_kernels: bool = True) -> Any:
+            settings = replace(scene.settings, samples=samples, device="CUDA", time_limit=0.0, seed=seed,
+                               own_kernels=own_kernels)  # fmt: skip
             return render(replace(scene, film=film, settings=settings))
 
         first = run(1)  # compiles
@@ -121,20 +122,14 @@ def luch(options: argparse.Namespace) -> int:
     return 0
 
 
-def _general_over_own(run: Callable[[int], Any]) -> float | None:
+def _general_over_own(run: Callable[..., Any]) -> float | None:
     """Seconds of the general kernels over those of the scene's own. None: no general ones, or a scene that needs more."""
-    from support.general_kernels import general_kernels_alone
 
-    def seconds() -> tuple[float, bool]:
-        one, many = run(1).stats, run(GENERAL_SAMPLES).stats
+    def seconds(own: bool) -> tuple[float, bool]:
+        one, many = (run(samples, own_kernels=own).stats for samples in (1, GENERAL_SAMPLES))
         return many["render_seconds"] - one["render_seconds"], many["kernels"] == "general"
 
-    own = seconds()[0]
-    with general_kernels_alone():
-        try:
-            general, real = seconds()
-        except (AssertionError, AttributeError):  # no kernels at all: the scene needs its own
-            return None
+    own, (general, real) = seconds(True)[0], seconds(False)
     return general / own if real else None
 
 

@@ -2,7 +2,7 @@
 
   build.py bench report SCENE.luch ... [--seconds 60] [--size 480] [--rounds 3] [--step GOOD]
 
-A13  seconds that the report took; each effect's share of the time as the report says, and as renders of the whole picture
+A13  seconds that the report took, and those that it foretells for the whole picture; each effect's share of the time as the report says, and as renders of the whole picture
      with and without it say, in turns (processor time)
 A9   bias of each choice as the report says, and as renders of the whole picture of many samples say (the same paths)
 A10  seconds to a step's error by the dial, pilot included, and by each choice of the report alone
@@ -41,10 +41,29 @@ OUT = ROOT / "out" / "bench"
 
 
 def spent(scene: Scene, samples: int) -> float:
-    """Processor seconds of tracing."""
-    shot = shoot(scene, 1, samples, lambda: True)
+    """Processor seconds of tracing, on a GPU those of the clock, by the scene's own kernels."""
+    while True:
+        shot = shoot(scene, 1, samples, lambda: True)
+        assert shot is not None
+        if shot.settled:
+            return shot.trace_seconds if shot.paths_to_fill else shot.trace_cpu_seconds
+        from luch.cuda import compiler
+
+        compiler.quiet()
+
+
+def foretold(report: Report, whole: Scene, samples: int) -> tuple[float, float]:
+    """Seconds of tracing of the whole picture as the report has them, and as they are."""
+    base = report.base_row
+    assert base is not None
+    told = base.sample_seconds / (report.width * report.height) * whole.film.pixels * samples
+    shot = shoot(whole, 1, samples, lambda: True)
     assert shot is not None
-    return shot.trace_cpu_seconds
+    print(
+        f"  seconds of {samples} samples of the whole picture: told {told:.2f}, true {shot.trace_seconds:.2f}",
+        flush=True,
+    )
+    return told, shot.trace_seconds
 
 
 def shares(report: Report, whole: Scene, rounds: int, samples: int) -> list[dict[str, Any]]:
@@ -106,19 +125,25 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--size", type=int, default=480, help="of the whole picture, its longer side")
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--samples", type=int, default=4)
+    parser.add_argument("--samples", type=int, default=4, help="of each; as many as keep a GPU busy")
+    parser.add_argument("--device", type=str.upper, default="CPU", choices=("CPU", "CUDA"))
     parser.add_argument("--long", type=int, default=0, help="samples of A9's renders (default: left out)")
     parser.add_argument("--step", choices=tuple(STEPS), help="for A10 (default: left out)")
     options = parser.parse_args()
     told: dict[str, Any] = {}
     for path in options.scenes:
-        whole = scaled(read_scene(path), options.size)
+        scene = read_scene(path)
+        scene.settings.device = options.device
+        scale = options.size / max(scene.film.size)
+        scene.film = replace(scene.film, width=round(scene.film.width * scale), height=round(scene.film.height * scale))
+        whole = scaled(scene, options.size)
         began = time.perf_counter()
         report, _ = make_report(whole, options.seconds)
         print(f"{path.stem}: {time.perf_counter() - began:.1f} s at {report.width} x {report.height}", flush=True)
         told[path.stem] = {
             "seconds": time.perf_counter() - began,
             "A13": shares(report, whole, options.rounds, options.samples),
+            "foretold": foretold(report, whole, options.samples),
             "A9": floors(report, whole, options.long) if options.long else [],
             "A10": dial(whole, report, options.step) if options.step else {},
         }

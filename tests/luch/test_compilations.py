@@ -73,6 +73,24 @@ def test_a_hundred_frames_that_are_drawn_meanwhile_start_one_compiler(slow: Comp
     assert all(one.kernel("shade")[1] == b"own" and not one.general for one in frames)
 
 
+def test_who_wants_general_kernels_alone_starts_no_compiler(slow: Compiler) -> None:
+    lasting = Scene(settings=Settings(own_kernels=False))
+    one = scene_kernels.SceneKernels(dict(FACTS), BLOCKS, lasting)
+    assert (slow.calls, one.general, one.settled, one.kernel("shade")[1]) == (0, True, True, b"general")
+    assert one.serve(dict(FACTS), lasting) and not one.serve(dict(FACTS), Scene())
+    slow.may_end.set()
+    beside = scene_kernels.SceneKernels(FACTS | {"structure": "KD_TREE"}, BLOCKS, lasting)  # which they do not serve
+    assert (slow.calls, beside.general, beside.settled) == (1, False, True)
+
+
+def test_times_are_told_to_be_mixed_where_kernels_change(slow: Compiler) -> None:
+    begun = frame()
+    assert not begun.settled
+    slow.may_end.set()
+    assert compiler.quiet(30.0) and begun.kernel("shade")[1] == b"own"
+    assert not begun.settled, "some of it was drawn by others"
+
+
 @pytest.mark.parametrize("effect", ["VOLUMES", "HAIR", "CURVES", "MOTION", "SUBSURFACE", "SAMPLER", "TIME"])
 def test_whatever_a_scene_needs_general_kernels_begin_it(
     slow: Compiler, monkeypatch: pytest.MonkeyPatch, effect: str

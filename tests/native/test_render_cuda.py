@@ -26,7 +26,6 @@ from support.cuda_on_cpu import FIBERS
 from support.devices import both, check_equal
 from support.effects import closure, program
 from support.everything import everything
-from support.general_kernels import general_kernels_alone
 
 LIGHT_PASSES = ["Emission", "Environment", "Ambient Occlusion", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color",
                 "Glossy Direct", "Glossy Indirect", "Glossy Color", "Transmission Direct", "Transmission Indirect",
@@ -342,7 +341,7 @@ def test_kernels_of_any_two_effects_draw_what_general_ones_do(place: str, effect
 @pytest.mark.cuda
 @pytest.mark.parametrize(
     "number, effects",
-    enumerate(covering_rows()),
+    [*enumerate(covering_rows())],
     ids=lambda row: f"{len(row)} effects" if isinstance(row, tuple) else "",
 )
 def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(
@@ -361,8 +360,7 @@ def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(
     with pytest.MonkeyPatch.context() as apart:
         apart.setattr(compiler, "ready_made", lambda module: [("-DLUCH_NEVER_COMPILED=1",)])
         own = render(scene)
-    with general_kernels_alone():
-        general = render(scene)
+    general = render(replace(scene, settings=replace(scene.settings, own_kernels=False)))
     assert (own.stats["kernels"], general.stats["kernels"]) == ("the scene's own", "general")
     for name, image in own.passes.items():
         assert np.array_equal(image.view(np.uint32), general.passes[name].view(np.uint32)), name

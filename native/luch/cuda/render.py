@@ -93,6 +93,7 @@ class DeviceRenderer(HostFilm):
         """Nothing of the picture is there yet."""
         self._scene = scene
         self._cancelled = self._abandoned = False
+        self.compiling = False  # what prepare() waits for, or waited for last
         self._waves_done = self._waves = 0
         self._counts = {"paths": 0, "rays": 0, "shadow_rays": 0}
         self._trace_seconds = self._upload_seconds = 0.0
@@ -179,6 +180,8 @@ class DeviceRenderer(HostFilm):
         return not self._cancelled
 
     def _goes_on(self) -> bool:
+        """Asked by who waits for the compiler."""
+        self.compiling = True
         return not self._cancelled
 
     def _prepare_waves(self, facts: dict[str, Any]) -> None:
@@ -197,11 +200,15 @@ class DeviceRenderer(HostFilm):
             self.rest()  # the free memory is asked for below
         self._held = self._allocate(pixels, max(1, facts["materials"]), beside)
 
+    @staticmethod
+    def _paths_that_fill() -> int:
+        """At once: with fewer the device is not busy all the time."""
+        processors = int(cupy().cuda.Device().attributes["MultiProcessorCount"])
+        return min(MOST_PATHS, 1 << max(20, (processors * PATHS_OF_MULTIPROCESSOR).bit_length() - 1))
+
     def _wanted_paths(self, pixels: int) -> int:
         """At once, were memory no matter."""
-        processors = int(cupy().cuda.Device().attributes["MultiProcessorCount"])
-        fills = 1 << max(20, (processors * PATHS_OF_MULTIPROCESSOR).bit_length() - 1)
-        return min(MOST_PATHS, fills, pixels * max(1, int(self._scene.settings.samples)))
+        return min(self._paths_that_fill(), pixels * max(1, int(self._scene.settings.samples)))
 
     @property
     def _memory(self) -> Memory:
@@ -482,9 +489,12 @@ class DeviceRenderer(HostFilm):
             "device_scene_bytes": self._arrays.bytes + self._tracer.bytes,
             "device_film_and_paths_bytes": self._memory.bytes,
             "paths_at_once": self._memory.slots,
+            "paths_to_fill": self._paths_that_fill(),
             "path_bytes": core.render.task_sizes()["path"],
             "kernel_plan": self._stages.plan,
             "shading_kernel": shading,
             "kernels": "general" if self._stages.general else "the scene's own",
+            "kernels_settled": self._stages.settled,
+            "general_kernels": self._stages.has_general,  # whether there are such that serve this scene
             "kernel_compile_seconds": self._stages.compile_seconds,
         }

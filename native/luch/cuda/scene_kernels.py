@@ -62,16 +62,23 @@ class SceneKernels:
         """
         self._text, self._flags, self.plan, self._operations = sources_of(facts, blocks, scene)
         self._view = kind_of_view(scene)
-        self._precision = scene.settings.precision
+        self._precision, self._wanted = scene.settings.precision, scene.settings.own_kernels
         self._module: Module | None = None
         self._under_way: compiler.Compilation | None = None
         self.compile_seconds = 0.0
-        self.general = False
+        self.general = self._changed = False
         self._start(facts, goes_on)
+
+    @property
+    def settled(self) -> bool:
+        """Whether these kernels drew all so far, and no others are on their way."""
+        return not self._changed and self._under_way is None
 
     def serve(self, facts: dict[str, Any], scene: Scene) -> bool:
         """Whether another view of the same scene needs the same code."""
         view = kind_of_view(scene)
+        if scene.settings.own_kernels != self._wanted:
+            return False
         if not same(view, self._view):
             if plans.plan_of(scene, self._operations, facts) != self.plan:
                 return False
@@ -80,19 +87,25 @@ class SceneKernels:
 
     def _start(self, facts: dict[str, Any], goes_on: Callable[[], bool] | None) -> None:
         architecture = architecture_of(cupy())
-        kept = compiler.kept(STAGES, self._precision, architecture, self._text, self._flags)
-        if kept is not None:
-            self._module = self._loaded(kept)
-            return
-        usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
-        usable = usable and not self.plan["TIME"]  # the clocks of other code would tell other prices
-        general_flags = compiler.ready_made(STAGES)[0]
-        general = compiler.ahead(STAGES, self._precision, architecture, general_flags) if usable else None
-        self._compile(architecture)
+        general = self._general(facts, architecture)
+        self.has_general = general is not None
+        if self._wanted or general is None:
+            kept = compiler.kept(STAGES, self._precision, architecture, self._text, self._flags)
+            if kept is not None:
+                self._module = self._loaded(kept)
+                return
+            self._compile(architecture)
         if general is not None:
             self._module, self.general = self._loaded(general), True
         elif self._under_way is not None:
             self._take(goes_on)
+
+    def _general(self, facts: dict[str, Any], architecture: int) -> bytes | None:
+        """What serves all scenes, if it does this one."""
+        usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
+        usable = usable and not self.plan["TIME"]  # the clocks of other code would tell other prices
+        general_flags = compiler.ready_made(STAGES)[0]
+        return compiler.ahead(STAGES, self._precision, architecture, general_flags) if usable else None
 
     def _compile(self, architecture: int) -> None:
         self._under_way = compiler.compiling(STAGES, self._precision, architecture, self._text, self._flags)
@@ -107,6 +120,7 @@ class SceneKernels:
             raise
         except Exception as failure:  # whatever it was, of the compiler's thread
             raise DeviceError(f"The kernels of this scene do not compile: {failure}") from failure
+        self._changed = self._module is not None
         self._module, self._under_way, self.general = self._loaded(image), None, False
         self.compile_seconds = compilation.seconds
 

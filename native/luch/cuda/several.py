@@ -22,7 +22,7 @@ from luch.ledger import REFUSALS
 
 # Counts and seconds that are added up; of other statistics the first device's stand for all.
 SUMMED = ("paths", "rays", "shadow_rays", "surface_points", "non_finite_samples", "clamped_units", "cut_units", "transparent_steps", "world_points",
-          "light_points", "device_scene_bytes", "device_film_and_paths_bytes", "paths_at_once", "subsurface_walks", "subsurface_steps", *REFUSALS)  # fmt: skip
+          "light_points", "device_scene_bytes", "device_film_and_paths_bytes", "paths_at_once", "paths_to_fill", "subsurface_walks", "subsurface_steps", *REFUSALS)  # fmt: skip
 
 
 def renderer_for(scene: Any) -> Any:
@@ -78,6 +78,11 @@ class SeveralDevices(HostFilm):
         names = [device.device.removeprefix("CUDA: ") for device in self._devices]
         kinds = list(dict.fromkeys(names))
         return "CUDA: " + ", ".join(f"{names.count(kind)} x {kind}" for kind in kinds)
+
+    @property
+    def compiling(self) -> bool:
+        """As DeviceRenderer's, of any device."""
+        return any(device.compiling for device in self._devices)
 
     def prepare(self) -> bool:
         """Builds structures and lights once, uploads them to every device. False when cancelled.
@@ -211,5 +216,7 @@ class SeveralDevices(HostFilm):
         each = [device.own_stats() for device in self._devices]
         stats: dict[str, Any] = {**self._host.core.stats(), **each[0]}
         stats.update({name: sum(own[name] for own in each) for name in SUMMED if name in each[0]})
+        if each[0]:
+            stats["kernels_settled"] = all(own["kernels_settled"] for own in each)
         stats["samples_per_second_of_gpus"] = [round(rate, 1) for rate in self._rates]
         return stats

@@ -78,8 +78,11 @@ def exact_settings(settings: Settings) -> dict[str, Any]:
     return {name: value for name, value in wanted.items() if getattr(settings, name) != value}
 
 
-def plan(scene: Scene, effects: Effects, accelerator: str = "", triangles: int = 0) -> Plan:
-    """accelerator: what renders of this scene chose, as their statistics name it; triangles: that they found."""
+def plan(
+    scene: Scene, effects: Effects, accelerator: str = "", triangles: int = 0, general_kernels: bool = False
+) -> Plan:
+    """accelerator: what renders of this scene chose, as their statistics name it; triangles: that they found;
+    general_kernels: whether a GPU's kernels for all scenes serve it."""
     settings = scene.settings
     on = {name for name in effects if effects[name].on}
     variants: list[Variant] = []
@@ -92,6 +95,9 @@ def plan(scene: Scene, effects: Effects, accelerator: str = "", triangles: int =
     variants.append(Variant(AS_SET, "Settings", "the scene's own settings", biased=True, rank=0))
     if settings.without_effects:
         absent.append(f"Left out of all: {', '.join(settings.without_effects)}, as the scene's settings say.")
+    if general_kernels and settings.own_kernels:
+        variants.append(Variant("general kernels", "Kernels", "those for all scenes, none compiled for this one",
+                                {"own_kernels": False}, rank=3))  # fmt: skip
     _add_structures(variants, absent, settings, accelerator, triangles)
     _add_precisions(variants, settings)
     _add_samplers(variants, settings)

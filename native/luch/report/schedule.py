@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from luch.identity import identity_of
 from luch.kept import Kept, room_for_both
 from luch.report.plan import AS_SET, EXACT, Plan, Variant, plan
 from luch.report.results import Point, Report, Row
-from luch.report.shots import GoesOn, Shot, scaled, shoot
+from luch.report.shots import GoesOn, NotReady, Shot, scaled, shoot
 from luch.report.tally import (
     Tally,
     brightness_of,
@@ -40,6 +40,9 @@ PILOT_SIZE, PILOT_SAMPLES = 48, 4  # pixels along the longer side
 PILOT_SECONDS, PILOT_GROWTH = 0.1, 8
 LEAST_SIZE, MOST_SIZE = 32, 320  # pixels along the longer side
 LEAST_SAMPLES, MOST_SAMPLES = 8, 256
+# A GPU's renders have so many times the paths that keep it busy: their last step, half of the samples, is what is
+# timed. In smaller ones that is the length of one path's way: an H100 was taken to need ten times what it does.
+TIMES_FULL, MOST_SAMPLES_OF_GPU = 1.5, 4096
 LEAST_ROUNDS, GOOD_ROUNDS, MOST_ROUNDS = 2, 4, 16
 REFERENCE_SHARE = 0.25  # of the time
 MOST_OVER = 64  # of the samples of the others: a half of the reference needs no more
@@ -65,6 +68,13 @@ class Told:
 Watch = Callable[[Told], bool]
 
 
+class _Time(NamedTuple):
+    """Of one render. settled: of kernels that it would have in the end, as luch.report.shots.Shot has it."""
+
+    seconds: float
+    settled: bool
+
+
 @dataclass
 class _Found:
     """What is known of one variant so far."""
@@ -74,8 +84,25 @@ class _Found:
     errors: dict[int, list[float]] = field(default_factory=dict)  # relMSE against the reference, by samples
     differences: Tally = field(default_factory=Tally)
     build: list[float] = field(default_factory=list)
-    trace: list[float] = field(default_factory=list)  # seconds
-    ratios: list[float] = field(default_factory=list)  # to the scene as it is set
+    # Seconds, and ratios to those of the scene as it is set; by whether the kernels were those that it would have.
+    timed: dict[bool, list[float]] = field(default_factory=dict)
+    compared: dict[bool, list[float]] = field(default_factory=dict)
+
+    @property
+    def trace(self) -> list[float]:
+        return self.timed.get(True) or self.timed[False]
+
+    @property
+    def ratios(self) -> list[float]:
+        """An effect's price is that of its code, too: code that holds all effects does not tell it."""
+        return self.compared.get(True) or ([] if self.variant.effect else self.compared.get(False, []))
+
+    def compare(self, cost: _Time, before: _Time, after: _Time, share: float = 0.5) -> None:
+        """With renders of the scene as it is set before and after, as far as their kernels are alike."""
+        alike = [(w, one.seconds) for w, one in ((1.0 - share, before), (share, after)) if one.settled == cost.settled]
+        if alike:
+            own = sum(w * seconds for w, seconds in alike) / sum(w for w, _ in alike)
+            self.compared.setdefault(cost.settled, []).append(cost.seconds / own)
 
 
 class Cancelled(Exception):
@@ -126,13 +153,15 @@ class Session:
         return not self.cancelled
 
     def _shoot(self, doing: str, scene: Scene, seed: int, samples: int, *, denoised: bool = False,
-               goes_on: GoesOn | None = None) -> Shot:  # fmt: skip
-        """Its build_seconds: where it shares what this session has built, what that took."""
+               goes_on: GoesOn | None = None, waits: bool = True) -> Shot:  # fmt: skip
+        """Its build_seconds: where it shares what this session has built, what that took. waits: as shoot has it."""
         self._doing = doing
         shares = self._shares(scene)
         kept = self._kept if shares else None
         goes_on = goes_on or self._goes_on
-        shot = shoot(scene, seed, samples, goes_on, denoised=denoised, kept=kept) if self._goes_on() else None
+        shot = None
+        if self._goes_on():
+            shot = shoot(scene, seed, samples, goes_on, denoised=denoised, kept=kept, waits=waits)
         if shot is None:
             raise Cancelled
         if shares:
@@ -170,12 +199,15 @@ class Session:
         shot = self._shoot("pilot", small, FIRST_SEED, samples)
         if shot.trace_seconds < min(PILOT_SECONDS, 0.02 * self.seconds):  # too short to tell; and now it is warm
             samples *= PILOT_GROWTH
+            if shot.paths_to_fill:
+                samples = 1 << math.ceil(math.log2(TIMES_FULL * shot.paths_to_fill / small.film.pixels))
             shot = self._shoot("pilot", small, FIRST_SEED, samples)
+        self._least_paths = TIMES_FULL * shot.paths_to_fill
         stats = shot.stats
         self._warnings = list(stats.get("warnings", []))
         self._device = stats["device"]
         self._plan: Plan = plan(self.scene, effects_of(self.scene), stats.get("accelerator", ""),
-                                int(stats.get("triangles", 0)))  # fmt: skip
+                                int(stats.get("triangles", 0)), bool(stats.get("general_kernels")))  # fmt: skip
         self._variants = [v for v in self._plan.variants if self._only is None or self._only(v)]
         pace = shot.trace_seconds / (small.film.pixels * samples)  # a path
         self._unmeasured = []
@@ -196,13 +228,14 @@ class Session:
         width, height = self.scene.film.size
         renders = GOOD_ROUNDS * len(self._variants) * (1.0 + 1.0 / ANCHOR_EVERY)
         tracing = max(0.05 * self.seconds, (1.0 - REFERENCE_SHARE) * self.left - renders * build)
-        paths = tracing / (renders * AVERAGE_COST * pace)
+        paths = max(self._least_paths, tracing / (renders * AVERAGE_COST * pace))
+        most = MOST_SAMPLES_OF_GPU if self._least_paths else MOST_SAMPLES
         samples = 16 if paths > 16 * LEAST_SIZE**2 else LEAST_SAMPLES
         longest = self._size or math.sqrt(paths / samples * max(width, height) / min(width, height))
         longest = int(min(max(longest, LEAST_SIZE), max(MOST_SIZE, self._size), max(width, height)))
         self._small = scaled(self.scene, longest)
         pixels = self._small.film.pixels
-        while samples < MOST_SAMPLES and 2 * samples * pixels < paths:
+        while samples < most and (2 * samples * pixels < paths or samples * pixels < self._least_paths):
             samples *= 2
         self._samples = self._asked_samples or samples
 
@@ -244,8 +277,9 @@ class Session:
         seed = FIRST_SEED + 1 + number
         base_scene = self._plan.base.of(self._small)
         pictures: dict[str, Any] = {}
-        anchor, since = 0.0, 0
-        waiting: list[tuple[_Found, float]] = []
+        anchor: _Time | None = None
+        since = 0
+        waiting: list[tuple[_Found, _Time]] = []
         spare = (self._patience - 1.0) * self.seconds
         half = 0.5 * (self.left + spare)
         for found in list(self._found):
@@ -258,7 +292,11 @@ class Session:
                 break
             variant = found.variant
             name = f"round {number + 1}: {variant.name}"
-            shot = self._shoot(name, variant.of(self._small), seed, self._samples, denoised=variant.denoised)
+            try:
+                shot = self._shoot(name, variant.of(self._small), seed, self._samples, denoised=variant.denoised,
+                                   waits=variant.rank == 0)  # fmt: skip
+            except NotReady:
+                continue  # in a later round
             if variant.name in (EXACT, AS_SET):
                 pictures[variant.name] = shot.last
             self._keep(found, shot, pictures)
@@ -266,7 +304,7 @@ class Session:
             if variant.name == self._plan.base.name:
                 anchor, since = cost, 0
                 for earlier, spent in waiting:
-                    earlier.ratios.append(spent / anchor)
+                    earlier.compare(spent, anchor, anchor)
                 waiting = []
                 continue
             waiting.append((found, cost))
@@ -276,21 +314,20 @@ class Session:
         if anchor and waiting:
             self._close(base_scene, seed, anchor, waiting)
 
-    def _close(self, scene: Scene, seed: int, before: float, waiting: list[tuple[_Found, float]]) -> float:
+    def _close(self, scene: Scene, seed: int, before: _Time, waiting: list[tuple[_Found, _Time]]) -> _Time:
         """One more render of the scene as it is set; those since the last are held against both."""
         after = self._cost(self._shoot("as set, for the time", scene, seed, self._samples))
         for place, (found, cost) in enumerate(waiting, 1):
-            share = place / (len(waiting) + 1)
-            found.ratios.append(cost / ((1.0 - share) * before + share * after))
+            found.compare(cost, before, after, place / (len(waiting) + 1))
         return after
 
-    def _cost(self, shot: Shot) -> float:
+    def _cost(self, shot: Shot) -> _Time:
         """What tracing took: the processors' time where they did it, which other jobs on the machine do not change."""
-        return shot.trace_cpu_seconds if self._device == "CPU" else shot.trace_seconds
+        return _Time(shot.trace_cpu_seconds if self._device == "CPU" else shot.trace_seconds, shot.settled)
 
     def _keep(self, found: _Found, shot: Shot, pictures: dict[str, Any]) -> None:
         found.build.append(shot.build_seconds)
-        found.trace.append(shot.trace_seconds)
+        found.timed.setdefault(shot.settled, []).append(shot.trace_seconds)
         pictures_kept = shot.filtered if found.variant.denoised else shot.pictures
         for samples, picture in pictures_kept.items():
             found.tallies.setdefault(samples, Tally()).add(picture)
@@ -303,13 +340,18 @@ class Session:
     # -- results ----------------------------------------------------------------------------------
 
     def _results(self) -> Report:
-        measured = [f for f in self._found if f.differences.count >= LEAST_ROUNDS]
+        base_name = self._plan.base.name
+        measured = [
+            f
+            for f in self._found
+            if f.differences.count >= LEAST_ROUNDS and (f.ratios or f.variant.name in (EXACT, base_name))
+        ]
         if not measured or measured[0].variant.name != EXACT:
             raise Cancelled
         logs = [np.log(f.ratios) for f in measured if len(f.ratios) > 1]
         if logs:  # a few ratios tell their spread badly; the machine's restlessness is that of all
             self._ratio_spread = float(np.sqrt(np.median([np.var(found, ddof=1) for found in logs])))
-        base = next((f for f in measured if f.variant.name == self._plan.base.name), measured[0])
+        base = next((f for f in measured if f.variant.name == base_name), measured[0])
         width, height = self._small.film.size
         full_width, full_height = self.scene.film.size
         left_out = [f.variant.name for f in self._found if f not in measured]
@@ -361,6 +403,8 @@ class Session:
 
 def _ratio(ratios: list[float], spread: float) -> tuple[float, float, float]:
     """Median of ratios with a 95 % interval. spread: of the logarithm of any ratio, at least."""
+    if not ratios:  # renders by other kernels than those of the scene as it is set: nothing is known
+        return 1.0, 0.0, math.inf
     logs = np.log(ratios)
     middle = float(np.median(logs))
     if len(logs) < 2:

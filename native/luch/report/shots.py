@@ -19,6 +19,10 @@ GoesOn = Callable[[], bool]
 FIRST_KEPT = 2  # samples; a single one says nothing of the rate
 
 
+class NotReady(Exception):
+    """Its kernels are still being compiled; who comes later finds them."""
+
+
 @dataclass
 class Shot:
     """pictures: number of samples -> Combined's colour, (H, W, 3); filtered: the same denoised."""
@@ -29,6 +33,16 @@ class Shot:
     trace_seconds: float = 0.0  # of a clock on the wall
     trace_cpu_seconds: float = 0.0  # of all threads of this process
     stats: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def settled(self) -> bool:
+        """Whether its times are those of the kernels that it would have in the end. A CPU has no others."""
+        return bool(self.stats.get("kernels_settled", True))
+
+    @property
+    def paths_to_fill(self) -> int:
+        """How many paths at once keep a GPU busy; 0 on a CPU."""
+        return int(self.stats.get("paths_to_fill", 0))
 
     @property
     def last(self) -> F32:
@@ -52,13 +66,18 @@ def scaled(scene: Scene, longest: int) -> Scene:
 
 
 def shoot(scene: Scene, seed: int, samples: int, goes_on: GoesOn, *, denoised: bool = False,
-          kept: Kept | None = None) -> Shot | None:  # fmt: skip
+          kept: Kept | None = None, waits: bool = True) -> Shot | None:  # fmt: skip
     """Renders `scaled` scenes; pictures are kept at powers of two and at the end. None where `goes_on` said no; it is
-    asked about ten times a second. kept: as luch.render.render has it."""
+    asked about ten times a second. kept: as luch.render.render has it. waits: for a compiler; NotReady otherwise."""
+    not_ready = False
     shot, shown = Shot(), {samples, *(1 << k for k in range(20) if FIRST_KEPT <= 1 << k < samples)}
     clock = _Clock()
 
     def watch(progress: Progress) -> bool:
+        nonlocal not_ready
+        if progress.compiling and not waits:
+            not_ready = True
+            return False
         if progress.new_picture:
             with clock.stopped(progress.samples):
                 if progress.samples in shown:
@@ -70,17 +89,19 @@ def shoot(scene: Scene, seed: int, samples: int, goes_on: GoesOn, *, denoised: b
 
     settings = replace(scene.settings, seed=seed, samples=max(2, samples))
     result = render(replace(scene, settings=settings), progress=watch, kept=kept)
+    if not_ready:
+        raise NotReady
     if result.cancelled:
         return None
     shot.stats = result.stats
     shot.build_seconds = 0.0 if result.stats["reused"] else result.stats["prepare_seconds"]
-    shot.trace_seconds, shot.trace_cpu_seconds = clock.all_samples()
+    shot.trace_seconds, shot.trace_cpu_seconds = clock.all_samples(late=shot.paths_to_fill > 0)
     return shot
 
 
 class _Clock:
-    """Seconds of tracing, on the wall and of the processors, from the first sample's end to the last's: what a render
-    does before and after is not in them, nor what the looks in between take."""
+    """Seconds of tracing, on the wall and of the processors, as the steps after the first one took: what a render does
+    before and after is not in them, nor what the looks in between take."""
 
     def __init__(self) -> None:
         self._ends: list[tuple[int, float, float]] = []  # samples, when they were traced
@@ -95,8 +116,10 @@ class _Clock:
         self._aside[0] += time.perf_counter() - wall
         self._aside[1] += time.process_time() - cpu
 
-    def all_samples(self) -> tuple[float, float]:
-        first, last = self._ends[0], self._ends[-1]
+    def all_samples(self, late: bool) -> tuple[float, float]:
+        """late: by the last step alone. A GPU is idle half of the time in the steps before, which are too small."""
+        last = self._ends[-1]
+        first = self._ends[max(0, len(self._ends) - 2) if late else 0]
         share = last[0] / max(1, last[0] - first[0])
         return max(1e-6, share * (last[1] - first[1])), max(1e-6, share * (last[2] - first[2]))
 
