@@ -42,8 +42,8 @@ class Gpu:
                 cost *= COSTS.get(name, 1.0)
         paths = scene.film.pixels * samples
         self.shots.append((paths, waits))
-        last = max(WAY, 0.5 * paths * PACE * cost * (1.0 if own else GENERAL))
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng((seed, len(self.shots)))
+        last = rng.normal(1.0, 0.01) * max(WAY, 0.5 * paths * PACE * cost * (1.0 if own else GENERAL))
         picture = np.full((scene.film.height, scene.film.width, 3), 0.5, np.float32)
         noise = rng.normal(0.0, 0.1 / samples**0.5, picture.shape)
         shot = Shot({samples: (picture + noise).astype(np.float32)}, trace_seconds=2.0 * last)
@@ -87,6 +87,12 @@ def test_an_effect_is_priced_by_kernels_that_leave_it_out(gpu: Gpu) -> None:
             assert left_out[name] == pytest.approx(cost, rel=0.1), name
     general = report.row("general kernels")
     assert general is not None and general.cost == pytest.approx(GENERAL, rel=0.1)
+
+
+def test_one_render_by_an_effects_own_kernels_is_as_sure_as_the_others_are(gpu: Gpu) -> None:
+    row = report_of(rounds=3).row("without indirect light")
+    assert row is not None and row.cost == pytest.approx(COSTS["indirect light"], rel=0.1)
+    assert row.cost_low < row.cost < row.cost_high < 1.1 * row.cost
 
 
 def test_effects_whose_kernels_did_not_come_in_time_are_named(gpu: Gpu) -> None:

@@ -100,6 +100,8 @@ def interval(row: Row) -> str:
 def _cost(row: Row) -> str:
     if row.cost_low == row.cost_high:
         return f"{row.cost:.2f}"
+    if not math.isfinite(row.cost_high):
+        return f"{row.cost:.2f} (not sure)"
     return f"{row.cost:.2f} ({row.cost_low:.2f} to {row.cost_high:.2f})"
 
 

@@ -406,10 +406,10 @@ def _ratio(ratios: list[float], spread: float) -> tuple[float, float, float]:
     if not ratios:  # renders by other kernels than those of the scene as it is set: nothing is known
         return 1.0, 0.0, math.inf
     logs = np.log(ratios)
-    middle = float(np.median(logs))
-    if len(logs) < 2:
+    middle, own = float(np.median(logs)), float(np.std(logs, ddof=1)) if len(logs) > 1 else 0.0
+    if len(logs) < 2 and spread == 0.0:
         return math.exp(middle), 0.0, math.inf
-    half = NORMAL_95 * max(spread, float(np.std(logs, ddof=1))) / math.sqrt(len(logs))
+    half = NORMAL_95 * max(spread, own) / math.sqrt(len(logs))
     return math.exp(middle), math.exp(middle - half), math.exp(middle + half)
 
 
