@@ -9,16 +9,20 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from luch import core
 from luch.cuda import compiler, plan, scene_kernels, trace
 from luch.cuda.device import DeviceError
 from luch.samplers import FAMILIES
 from luch.scene import Scene, Settings
+from support import cuda_on_cpu
 from support.frames import resident_mib
+from support.points import block
 
 ASKED = ("RENDER_STAGES", "WATERTIGHT", 90, "programs", ("-DA=1",))
 FACTS = {"programs": [], "materials": 0, "structure": "CWBVH", "registers": 8, "transparent": False}
@@ -195,3 +199,31 @@ def test_what_a_compiler_took_of_the_heap_is_given_back(monkeypatch: pytest.Monk
     assert compiler._compile_and_keep(None, compiler._Unit(*ASKED)) == b"own"
     assert seen[1] - seen[0] > 100.0
     assert resident_mib() - seen[0] < 20.0
+
+
+# As a compiler for GPUs reads it; what C++ does not know there is not called.
+DRAW = """unsigned __byte_perm(unsigned, unsigned, unsigned);
+float __fmaf_rn(float, float, float);
+#define __CUDACC__
+#include "luch/sampling/sampler.h"
+extern "C" void draw(unsigned seed, unsigned index, unsigned dimension, float* to) {
+    luch::Sampler sampler{seed, index};
+    luch::Vec3 three = luch::sample_3d(sampler, dimension);
+    luch::Vec2 two = luch::sample_2d(sampler, dimension);
+    float all[6] = {luch::sample_1d(sampler, dimension), two.x, two.y, three.x, three.y, three.z};
+    for (int k = 0; k < 6; ++k) to[k] = all[k];
+}
+"""
+
+
+def test_general_kernels_draw_from_the_family_that_a_dimension_names(tmp_path: Path) -> None:
+    """Compiled for a GPU without a family they drew Sobol's points for all: other numbers than the scene's own."""
+    (flags,) = compiler.ready_made(scene_kernels.STAGES)
+    kernels = cuda_on_cpu.library(DRAW, tmp_path, list(compiler.source_folders()), flags)
+    drawn = (ctypes.c_float * 6)()
+    for family in range(len(FAMILIES)):
+        dimension = 6 + (family << 30)
+        for index in (0, 1, 12345):
+            kernels.draw(9, index, dimension, drawn)
+            (told,) = core.sampling.sample_any(9, block(index, 1), dimension)
+            np.testing.assert_array_equal(np.array(drawn), told[[0, 0, 1, 0, 1, 2]])

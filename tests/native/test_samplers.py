@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from luch import core, samplers
-from luch.cuda import compiler
-from luch.cuda.scene_kernels import STAGES
 from numpy.typing import NDArray
 from scipy import stats
-from support import cuda_on_cpu
 from support.points import block, counts
 
 sampling = core.sampling
@@ -38,34 +33,6 @@ def test_a_dimension_names_its_family_and_fewer_coordinates_are_the_first_of_mor
         drawn = sampling.sample_any(9, block(5, 64), named)
         assert (drawn[:, 0] >= 0.0).all(), "sample_1d or sample_2d says otherwise"
         np.testing.assert_array_equal(drawn, sampling.sample_3d(9, block(5, 64), named, family))
-
-
-# As a compiler for GPUs reads it; what C++ does not know there is not called.
-DRAW = """unsigned __byte_perm(unsigned, unsigned, unsigned);
-float __fmaf_rn(float, float, float);
-#define __CUDACC__
-#include "luch/sampling/sampler.h"
-extern "C" void draw(unsigned seed, unsigned index, unsigned dimension, float* to) {
-    luch::Sampler sampler{seed, index};
-    luch::Vec3 three = luch::sample_3d(sampler, dimension);
-    luch::Vec2 two = luch::sample_2d(sampler, dimension);
-    float all[6] = {luch::sample_1d(sampler, dimension), two.x, two.y, three.x, three.y, three.z};
-    for (int k = 0; k < 6; ++k) to[k] = all[k];
-}
-"""
-
-
-def test_general_kernels_draw_from_the_family_that_a_dimension_names(tmp_path: Path) -> None:
-    """Compiled for a GPU without a family they drew Sobol's points for all: other numbers than the scene's own."""
-    (flags,) = compiler.ready_made(STAGES)
-    kernels = cuda_on_cpu.library(DRAW, tmp_path, list(compiler.source_folders()), flags)
-    drawn = (ctypes.c_float * 6)()
-    for family in range(len(samplers.NAMES)):
-        dimension = 6 + (family << 30)
-        for index in (0, 1, 12345):
-            kernels.draw(9, index, dimension, drawn)
-            (told,) = sampling.sample_any(9, block(index, 1), dimension)
-            np.testing.assert_array_equal(np.array(drawn), told[[0, 0, 1, 0, 1, 2]])
 
 
 @pytest.mark.parametrize("family", OTHERS)
