@@ -292,8 +292,8 @@ class _Line:
             return
         self._next = now + 0.25
         if progress.preparing:
-            doing = "compiling kernels for this GPU" if progress.compiling else "building structures and lights"
-            self._write(doing)
+            doing = progress.doing_before
+            self._write(doing[0].lower() + doing[1:])
             return
         error = f", error {percent(progress.error)} %" if progress.error is not None else ""
         left = f", {progress.remaining_seconds:.0f} s left" if np.isfinite(progress.remaining_seconds) else ""

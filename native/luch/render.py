@@ -74,6 +74,11 @@ class Progress:
     compiling: bool = False  # what is waited for then is the compiler of a GPU's kernels
     steering: Steering | None = None  # None while preparing
 
+    @property
+    def doing_before(self) -> str:
+        """What it does while preparing, in words."""
+        return "Compiling kernels for this GPU" if self.compiling else "Building structures and lights"
+
 
 @dataclass(frozen=True)
 class Pace:

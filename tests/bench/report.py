@@ -2,8 +2,8 @@
 
   build.py bench report SCENE.luch ... [--seconds 60] [--size 480] [--rounds 3] [--step GOOD]
 
-A13  seconds that the report took, and those that it foretells for the whole picture; each effect's share of the time as the report says, and as renders of the whole picture
-     with and without it say, in turns (processor time)
+A13  seconds that the report took, and those that it foretells for the whole picture; each effect's share of the time as
+     the report says, and as renders of the whole picture with and without it say, in turns (processor time)
 A9   bias of each choice as the report says, and as renders of the whole picture of many samples say (the same paths)
 A10  seconds to a step's error by the dial, pilot included, and by each choice of the report alone
 
@@ -25,11 +25,12 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "native"), str(ROOT / "tests")]
 
 import numpy as np  # noqa: E402
+from luch.cuda import compiler  # noqa: E402
 from luch.quality import CHOICES  # noqa: E402
 from luch.render import render  # noqa: E402
 from luch.report import Report, make_report  # noqa: E402
 from luch.report.plan import plan  # noqa: E402
-from luch.report.shots import scaled, shoot  # noqa: E402
+from luch.report.shots import Shot, scaled, shoot  # noqa: E402
 from luch.report.tally import relative_error, weights  # noqa: E402
 from luch.scene import Scene  # noqa: E402
 from luch.scenefile import read_scene  # noqa: E402
@@ -40,16 +41,20 @@ from luch.effects import effects_of  # noqa: E402 isort: skip
 OUT = ROOT / "out" / "bench"
 
 
-def spent(scene: Scene, samples: int) -> float:
-    """Processor seconds of tracing, on a GPU those of the clock, by the scene's own kernels."""
+def timed(scene: Scene, samples: int) -> Shot:
+    """On a GPU by the scene's own kernels."""
     while True:
         shot = shoot(scene, 1, samples, lambda: True)
         assert shot is not None
         if shot.settled:
-            return shot.trace_seconds if shot.paths_to_fill else shot.trace_cpu_seconds
-        from luch.cuda import compiler
-
+            return shot
         compiler.quiet()
+
+
+def spent(scene: Scene, samples: int) -> float:
+    """Processor seconds of tracing, on a GPU those of the clock."""
+    shot = timed(scene, samples)
+    return shot.trace_seconds if shot.paths_to_fill else shot.trace_cpu_seconds
 
 
 def foretold(report: Report, whole: Scene, samples: int) -> tuple[float, float]:
@@ -57,13 +62,9 @@ def foretold(report: Report, whole: Scene, samples: int) -> tuple[float, float]:
     base = report.base_row
     assert base is not None
     told = base.sample_seconds / (report.width * report.height) * whole.film.pixels * samples
-    shot = shoot(whole, 1, samples, lambda: True)
-    assert shot is not None
-    print(
-        f"  seconds of {samples} samples of the whole picture: told {told:.2f}, true {shot.trace_seconds:.2f}",
-        flush=True,
-    )
-    return told, shot.trace_seconds
+    true = timed(whole, samples).trace_seconds
+    print(f"  seconds of {samples} samples of the whole picture: told {told:.2f}, true {true:.2f}", flush=True)
+    return told, true
 
 
 def shares(report: Report, whole: Scene, rounds: int, samples: int) -> list[dict[str, Any]]:
@@ -132,11 +133,8 @@ def main() -> int:
     options = parser.parse_args()
     told: dict[str, Any] = {}
     for path in options.scenes:
-        scene = read_scene(path)
-        scene.settings.device = options.device
-        scale = options.size / max(scene.film.size)
-        scene.film = replace(scene.film, width=round(scene.film.width * scale), height=round(scene.film.height * scale))
-        whole = scaled(scene, options.size)
+        whole = scaled(read_scene(path), options.size, enlarged=True)
+        whole.settings.device = options.device
         began = time.perf_counter()
         report, _ = make_report(whole, options.seconds)
         print(f"{path.stem}: {time.perf_counter() - began:.1f} s at {report.width} x {report.height}", flush=True)

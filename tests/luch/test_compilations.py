@@ -48,7 +48,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
     made = Compiler()
     monkeypatch.setattr(compiler, "compiled", made)
     monkeypatch.setattr(compiler, "kept", lambda *asked: None)
-    monkeypatch.setattr(compiler, "ahead", lambda *asked: b"general")
+    monkeypatch.setattr(compiler, "ahead_file", lambda *asked: SimpleNamespace(read_bytes=lambda: b"general"))
     monkeypatch.setattr(
         compiler, "scene_module", lambda image, device: SimpleNamespace(kernel=lambda name: (name, image))
     )
@@ -124,7 +124,7 @@ def test_kernels_beside_the_stages_are_compiled_ahead_for_all_that_moves_grows_a
 
 def test_who_cancels_does_not_wait_for_the_compiler(slow: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no general kernels are: as long as the scene's own take, seconds, nobody was asked."""
-    monkeypatch.setattr(compiler, "ahead", lambda *asked: None)
+    monkeypatch.setattr(compiler, "ahead_file", lambda *asked: None)
     asked: list[float] = []
 
     def goes_on() -> bool:

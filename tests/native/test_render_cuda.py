@@ -349,9 +349,9 @@ def test_kernels_compiled_ahead_of_time_draw_what_the_scenes_own_do(
 ) -> None:
     """Which interpret programs, and hold all that any scene may need."""
     if place == FIBERS:
-        pytest.skip("on a GPU alone")  # it is nvcc's machine code that is held against NVRTC's
+        pytest.skip("on a GPU alone: nvcc's machine code is held against NVRTC's, and fibers run neither")
     architecture = device.architecture_of(device.cupy())
-    if compiler.ahead(STAGES, "WATERTIGHT", architecture, compiler.ready_made(STAGES)[0]) is None:
+    if compiler.ahead_file(STAGES, "WATERTIGHT", architecture, compiler.ready_made(STAGES)[0]) is None:
         # Only with them in place, which the other tests must not have: scenes this small would end before their own
         # kernels are there. tests/bench/records/cuda-tests.json says when it ran.
         pytest.skip("build.py build --cuda was not run")

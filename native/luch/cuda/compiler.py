@@ -128,8 +128,8 @@ def _runs_on(architecture: int) -> list[int]:
     return sorted((a for a in known if a // 10 == architecture // 10 and a <= architecture), reverse=True)
 
 
-def ahead(module: str, precision: str, architecture: int, defines: Sequence[str] = ()) -> bytes | None:
-    """What build.py compiled ahead of time: machine code, or PTX where the build did not know the architecture.
+def ahead_file(module: str, precision: str, architecture: int, defines: Sequence[str] = ()) -> Path | None:
+    """Where what build.py compiled ahead of time lies: machine code, or PTX where it did not know the architecture.
 
     The stages have no PTX: the driver would need minutes for all that general code may do, NVRTC needs seconds for
     what a scene does.
@@ -137,8 +137,14 @@ def ahead(module: str, precision: str, architecture: int, defines: Sequence[str]
     for target in (*_runs_on(architecture), 0):
         ready = AHEAD / ahead_name(module, precision, target, defines)
         if ready.is_file():
-            return ready.read_bytes()
+            return ready
     return None
+
+
+def ahead(module: str, precision: str, architecture: int, defines: Sequence[str] = ()) -> bytes | None:
+    """What lies there."""
+    file = ahead_file(module, precision, architecture, defines)
+    return None if file is None else file.read_bytes()
 
 
 @functools.lru_cache(maxsize=SCENES_KEPT)
@@ -157,7 +163,8 @@ def kept(module: str, precision: str, architecture: int, programs: str, defines:
 def compiled(module: str, precision: str, architecture: int, programs: str, defines: Sequence[str]) -> bytes:
     """Machine code (PTX where NVRTC is older than the device) out of the cache, or compiled now and kept there.
 
-    programs: a scene's, luch.cuda.programs.source; "": none. Who renders asks for compiling(), so that nothing is compiled twice at once.
+    programs: a scene's, luch.cuda.programs.source; "": none. Who renders asks for compiling(), so that nothing is
+    compiled twice at once.
     """
     from cupy.cuda import nvrtc
 

@@ -87,7 +87,10 @@ class SceneKernels:
 
     def _start(self, facts: dict[str, Any], goes_on: Callable[[], bool] | None) -> None:
         architecture = architecture_of(cupy())
-        general = self._general(facts, architecture)
+        usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
+        usable = usable and not self.plan["TIME"]  # the clocks of other code would tell other prices
+        flags = compiler.ready_made(STAGES)[0]
+        general = compiler.ahead_file(STAGES, self._precision, architecture, flags) if usable else None
         self.has_general = general is not None
         if self._wanted or general is None:
             kept = compiler.kept(STAGES, self._precision, architecture, self._text, self._flags)
@@ -96,16 +99,9 @@ class SceneKernels:
                 return
             self._compile(architecture)
         if general is not None:
-            self._module, self.general = self._loaded(general), True
+            self._module, self.general = self._loaded(general.read_bytes()), True
         elif self._under_way is not None:
             self._take(goes_on)
-
-    def _general(self, facts: dict[str, Any], architecture: int) -> bytes | None:
-        """What serves all scenes, if it does this one."""
-        usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
-        usable = usable and not self.plan["TIME"]  # the clocks of other code would tell other prices
-        general_flags = compiler.ready_made(STAGES)[0]
-        return compiler.ahead(STAGES, self._precision, architecture, general_flags) if usable else None
 
     def _compile(self, architecture: int) -> None:
         self._under_way = compiler.compiling(STAGES, self._precision, architecture, self._text, self._flags)

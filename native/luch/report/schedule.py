@@ -197,10 +197,10 @@ class Session:
         small = scaled(self.scene, PILOT_SIZE)
         samples = PILOT_SAMPLES
         shot = self._shoot("pilot", small, FIRST_SEED, samples)
-        if shot.trace_seconds < min(PILOT_SECONDS, 0.02 * self.seconds):  # too short to tell; and now it is warm
-            samples *= PILOT_GROWTH
-            if shot.paths_to_fill:
-                samples = 1 << math.ceil(math.log2(TIMES_FULL * shot.paths_to_fill / small.film.pixels))
+        too_short = shot.trace_seconds < min(PILOT_SECONDS, 0.02 * self.seconds)
+        if shot.paths_to_fill or too_short:  # to tell; and now it is warm
+            filling = TIMES_FULL * shot.paths_to_fill / small.film.pixels
+            samples = 1 << math.ceil(math.log2(filling)) if shot.paths_to_fill else PILOT_GROWTH * samples
             shot = self._shoot("pilot", small, FIRST_SEED, samples)
         self._least_paths = TIMES_FULL * shot.paths_to_fill
         stats = shot.stats

@@ -49,11 +49,13 @@ class Shot:
         return self.pictures[max(self.pictures)]
 
 
-def scaled(scene: Scene, longest: int) -> Scene:
-    """The scene's picture with that many pixels along its longer side, or its own if that is smaller; whole samples
-    alone end its renders, and they keep no marks."""
+def scaled(scene: Scene, longest: int, *, enlarged: bool = False) -> Scene:
+    """The scene's picture with that many pixels along its longer side, or its own if that is smaller and not to be
+    enlarged; whole samples alone end its renders, and they keep no marks."""
     film = scene.film
-    factor = min(1.0, longest / max(film.width, film.height))
+    factor = longest / max(film.width, film.height)
+    if not enlarged:
+        factor = min(1.0, factor)
     border = film.border
     if border is not None:
         x0, y0, x1, y1 = (round(edge * factor) for edge in border)
