@@ -99,7 +99,7 @@ def is_watched() -> bool:
 def progress_line(progress: Any) -> str:
     """For the status line: "Sample 32/128 | Remaining 00:14 | 312 MiB"."""
     if progress.preparing:
-        return progress.doing_before
+        return str(progress.doing_before)
     parts = [f"Sample {progress.samples}/{progress.total_samples}"]
     if progress.error is not None:
         parts.append(f"Error {percent(progress.error)} %")
@@ -113,7 +113,7 @@ def progress_line(progress: Any) -> str:
 def viewport_line(progress: Any) -> str:
     """For a 3D view's status: "Sample 64/1024 | Error 0.80 % (0.70 to 0.90 %) - 12 s to 0.5 %"."""
     if progress.preparing:
-        return progress.doing_before
+        return str(progress.doing_before)
     parts = [f"Sample {progress.samples}/{progress.total_samples}"]
     found = progress.curve.last if progress.curve is not None else None
     if found is not None:
