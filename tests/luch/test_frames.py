@@ -10,7 +10,7 @@ from support.hard_geometry import room_scene
 
 
 @pytest.mark.promise(8)
-@pytest.mark.parametrize(("device", "frames"), [("CPU", 30), pytest.param("CUDA", 100, marks=pytest.mark.cuda)])
+@pytest.mark.parametrize(("device", "frames"), [("CPU", 100), pytest.param("CUDA", 100, marks=pytest.mark.cuda)])
 def test_frame_after_frame_takes_no_more_memory_or_threads(device: str, frames: int) -> None:
     scene = room_scene(0.0, "object", 0.8, size=16, samples=1, device=device)
     threads = threading.active_count()
