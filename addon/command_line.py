@@ -11,6 +11,7 @@ import functools
 import sys
 from typing import Any, NoReturn
 
+from luch.integrators import NAMES as INTEGRATORS
 from luch.samplers import NAMES as SAMPLERS
 from luch.stopping import CUSTOM, STEPS, UNLIMITED_SAMPLES
 
@@ -36,6 +37,7 @@ OPTIONS = (
     "--luch-gpus N",
     "--luch-seed N",
     "--luch-sampler SOBOL|INDEPENDENT|LATTICE",
+    "--luch-integrator PATH|PHOTON",
     "--luch-mergeable",
     "--luch-first-sample N",
     "--luch-samples-in-all N",
@@ -65,6 +67,7 @@ def overrides(words: tuple[str, ...]) -> dict[str, Any]:
     for name in ("seed", "first-sample", "samples-in-all"):
         parser.add_argument(f"--luch-{name}", type=_count)
     parser.add_argument("--luch-sampler", choices=SAMPLERS, type=str.upper)
+    parser.add_argument("--luch-integrator", choices=INTEGRATORS, type=str.upper)
     parser.add_argument("--luch-adaptive", action="store_const", const=True)
     found, rest = parser.parse_known_args(own)
     unknown = [word for word in rest if word.startswith("--luch")]

@@ -6,6 +6,8 @@ from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from luch.integrators import DEFAULT as DEFAULT_INTEGRATOR
+from luch.integrators import INTEGRATORS
 
 
 def _bounces(name: str, default: int, what: str) -> bpy.props._PropertyDeferred:
@@ -179,6 +181,12 @@ class LuchSceneSettings(bpy.types.PropertyGroup):
         ],
         default="SOBOL",
         description="How random numbers are spread: more or less noise, the same picture in the end",
+    )
+    integrator: EnumProperty(
+        name="Integrator",
+        items=[(name, kind.title, f"{kind.reason[0].upper()}{kind.reason[1:]}") for name, kind in INTEGRATORS.items()],
+        default=DEFAULT_INTEGRATOR,
+        description="How light is followed",
     )
     max_bounces: _bounces("Max Bounces", 12, "Bounces of any kind on a path")
     diffuse_bounces: _bounces("Diffuse Bounces", 4, "Bounces off diffuse surfaces on a path")

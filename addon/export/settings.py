@@ -39,6 +39,7 @@ def export_settings(context: ExportContext) -> Settings:
     settings = Settings(
         seed=_seed(scene),
         sampler=scene.luch.sampling_pattern,
+        integrator=scene.luch.integrator,
         threads=_threads(scene),
         transparent_bounces=effective(scene, "transparent_max_bounces"),
         clamp_direct=effective(scene, "sample_clamp_direct"),

@@ -104,6 +104,7 @@ class LUCH_RENDER_PT_light_paths(LuchPanel, bpy.types.Panel):
         draw_settings(
             self.layout,
             context.scene,
+            "integrator",
             "max_bounces",
             "diffuse_bounces",
             "glossy_bounces",

@@ -24,6 +24,12 @@ SamplerFamily named_sampler(const std::string& name) {
     return SamplerFamily(found - std::begin(SAMPLER_NAMES));
 }
 
+bool wants_photon_maps(const std::string& integrator) {
+    if (integrator != "PATH" && integrator != "PHOTON")
+        throw std::invalid_argument("Settings: the integrator is '" + integrator + "'; it can be PATH or PHOTON.");
+    return integrator == "PHOTON";
+}
+
 }  // namespace
 
 void Reader::read_camera_motion(const py::object& motion, cpu::CameraSpec spec, const cpu::FrameSpec& frame) {
@@ -145,6 +151,7 @@ void Reader::read_settings(const py::object& settings) {
     limits.caustics_reflective = py::cast<bool>(settings.attr("caustics_reflective"));
     limits.caustics_refractive = py::cast<bool>(settings.attr("caustics_refractive"));
     limits.ao_distance = number("ao_distance");
+    input.photon_maps = wants_photon_maps(py::cast<std::string>(settings.attr("integrator")));
     input.light_tree = py::cast<bool>(settings.attr("light_tree"));
     read_curve_settings(settings);
     input.seed = count("seed");

@@ -86,6 +86,7 @@ class SceneStore {
     // Points the view at the arrays; call after the last add_.
     const SceneView& finish();
     SceneView& view() { return view_; }
+    MaterialView* materials() { return materials_.data(); }
     const SceneView& view() const { return view_; }
 
     // Per mesh, per primitive: bit 0 set when some object that uses the mesh has a material there that may be

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from luch import __version__, cryptomatte, samplers
+from luch import __version__, cryptomatte, integrators, samplers
 from luch.accuracy import percent
 from luch.bench import device_rays
 from luch.cuda import DeviceError
@@ -64,6 +64,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--report", type=Path, metavar="PATH", help="a report.json that --quality chooses by")
     render.add_argument("--denoise", action="store_true", default=None, help="Combined through Open Image Denoise")
     render.add_argument("--seed", type=int, help="seed of the sampler")
+    render.add_argument("--integrator", type=str.upper, choices=integrators.NAMES, help="how light is followed")
     render.add_argument("--sampler", type=str.upper, choices=samplers.NAMES, help="how random numbers are spread")
     render.add_argument("--first-sample", type=int, metavar="N", help="leave out N samples that another render takes")
     render.add_argument(
@@ -238,6 +239,8 @@ def _override(scene: Scene, options: argparse.Namespace) -> None:
         settings.seed = options.seed
     if options.sampler is not None:
         settings.sampler = options.sampler
+    if options.integrator is not None:
+        settings.integrator = options.integrator
     settings.mergeable, settings.verify = options.mergeable, options.verify
     settings.adaptive = settings.adaptive or options.adaptive
     if options.device is not None:

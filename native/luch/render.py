@@ -122,13 +122,17 @@ def _next_count(done: int, next_look: int, seconds: float) -> int:
 
 def _adaptive_for(film: Film, settings: Settings) -> Adaptive | None:
     """Only on the way to an error; merged pictures must have the same samples everywhere."""
-    if not (settings.adaptive and settings.error_limit > 0.0) or settings.mergeable:
+    if not (settings.adaptive and settings.error_limit > 0.0) or settings.mergeable or settings.integrator == "PHOTON":
         return None
     return Adaptive(film, settings.samples)
 
 
 def _not_adaptive(settings: Settings) -> list[str]:
-    if not (settings.adaptive and settings.error_limit > 0.0 and settings.mergeable):
+    if not (settings.adaptive and settings.error_limit > 0.0):
+        return []
+    if settings.integrator == "PHOTON":
+        return ["Adaptive Sampling is left out: with photon maps a sample of all pixels shares its photons."]
+    if not settings.mergeable:
         return []
     return ["Adaptive Sampling is left out: pictures that are merged or verified have the same samples everywhere."]
 

@@ -334,7 +334,7 @@ class Settings:
     precision: str = "WATERTIGHT"  # "FAST", "DOUBLE"
     curve_shape: str = "RIBBON"  # turned to each ray, shaded as if round; or "THICK" (round), "THICK_LINEAR" (cones)
     curve_subdivisions: int = 2  # a ribbon is straight in 2**n pieces of a segment, n at most 4
-    integrator: str = "PATH"
+    integrator: str = "PATH"  # a name of luch.integrators
     device: str = "CPU"  # or "CUDA"
     texture_memory: float = 0.0  # MB of images on each GPU, 0: what fits; the rest is read from the host's memory
     gpus: int = 0  # how many of the CUDA devices that are visible, 0: all

@@ -46,6 +46,12 @@ def test_the_dial_and_denoising_can_be_asked_for_and_an_error_overrules_a_dial()
     assert overrides(("blender", "--", "--luch-samples", "4", "--luch-quality", "HIGH"))["quality"] == "HIGH"
 
 
+def test_the_integrator_is_named_in_any_case() -> None:
+    assert overrides(("blender", "--", "--luch-integrator", "photon"))["integrator"] == "PHOTON"
+    with pytest.raises(CommandLineError, match="BIDIRECTIONAL"):
+        overrides(("blender", "--", "--luch-integrator", "bidirectional"))
+
+
 def test_the_sampler_is_named_in_any_case() -> None:
     assert overrides(("blender", "--", "--luch-sampler", "lattice"))["sampler"] == "LATTICE"
     with pytest.raises(CommandLineError, match="HALTON"):

@@ -7,7 +7,7 @@ import math
 import bpy
 import numpy as np
 import pytest
-from luch import samplers
+from luch import integrators, samplers
 from luch.scene import Light, Scene
 
 from addon.export import export_scene
@@ -192,6 +192,14 @@ def test_the_sampling_pattern_reaches_the_renderer(scene: bpy.types.Scene) -> No
     for name in samplers.NAMES:
         scene.luch.sampling_pattern = name
         assert export().settings.sampler == name
+
+
+def test_the_integrator_reaches_the_renderer(scene: bpy.types.Scene) -> None:
+    add_camera(scene)
+    assert export().settings.integrator == integrators.DEFAULT == "PATH"
+    for name in integrators.NAMES:
+        scene.luch.integrator = name
+        assert export().settings.integrator == name
 
 
 def test_samples_of_the_view_layer_win(scene: bpy.types.Scene) -> None:

@@ -52,7 +52,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
     monkeypatch.setattr(
         compiler, "scene_module", lambda image, device: SimpleNamespace(kernel=lambda name: (name, image))
     )
-    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: {"TIME": False})
+    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: {"TIME": False, "PHOTONS": False})
     for user in (compiler, scene_kernels):
         monkeypatch.setattr(user, "architecture_of", lambda module: 90)
         monkeypatch.setattr(user, "cupy", lambda: SimpleNamespace(cuda=SimpleNamespace(Device=lambda: SimpleNamespace(id=0))))  # fmt: skip
@@ -95,15 +95,15 @@ def test_times_are_told_to_be_mixed_where_kernels_change(slow: Compiler) -> None
     assert not begun.settled, "some of it was drawn by others"
 
 
-@pytest.mark.parametrize("effect", ["VOLUMES", "HAIR", "CURVES", "MOTION", "SUBSURFACE", "SAMPLER", "TIME"])
+@pytest.mark.parametrize("effect", ["VOLUMES", "HAIR", "CURVES", "MOTION", "SUBSURFACE", "SAMPLER", "TIME", "PHOTONS"])
 def test_whatever_a_scene_needs_general_kernels_begin_it(
     slow: Compiler, monkeypatch: pytest.MonkeyPatch, effect: str
 ) -> None:
-    """All but the clocks of Render Time: those of other code would tell other prices."""
-    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: {"TIME": False, effect: True})
-    if effect == "TIME":
+    """All but the clocks of Render Time, as those of other code would tell other prices, and photon maps."""
+    monkeypatch.setattr(scene_kernels.plans, "plan_of", lambda *given: {"TIME": False, "PHOTONS": False, effect: True})
+    if effect in ("TIME", "PHOTONS"):
         slow.may_end.set()
-    assert frame().general == (effect != "TIME")
+    assert frame().general == (effect not in ("TIME", "PHOTONS"))
 
 
 def test_kernels_beside_the_stages_are_compiled_ahead_for_all_that_moves_grows_and_draws() -> None:

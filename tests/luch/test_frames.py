@@ -15,4 +15,4 @@ def test_frame_after_frame_takes_no_more_memory_or_threads(device: str, frames: 
     scene = room_scene(0.0, "object", 0.8, size=16, samples=1, device=device)
     threads = threading.active_count()
     assert frame_growth(scene, frames) <= 0.05
-    assert threading.active_count() == threads
+    assert threading.active_count() <= threads  # compilers that other tests left may end meanwhile

@@ -26,7 +26,9 @@ from luch.cuda import compiler, device
 HERE = Path(__file__).parent
 FIBERS, GPU = "fibers", "cuda"  # where a test's kernels run
 # A kernel whose parameters stand in its source: paths.cu, shadow.cuh.
-PLAIN_KERNEL = r'extern "C" __global__ void\s+(?:__launch_bounds__\([^)]*\)\s*)?(\w+)\(([^)]*RenderTask[^)]*)\)\s*{'
+PLAIN_KERNEL = (
+    r'extern "C" __global__ void\s+(?:__launch_bounds__\([^)]*\)\s*)?(\w+)\(([^)]*(?:RenderTask|Photon)[^)]*)\)\s*{'
+)
 FLAGS = ["-std=gnu++20", "-O1", "-march=x86-64-v3", "-ffp-contract=off", "-shared", "-fPIC", "-w"]
 if os.environ.get("LUCH_WATCH_KERNELS"):  # build.py test --watch-kernels
     # Not their stacks: those are fibers', which AddressSanitizer cannot tell apart.
@@ -230,6 +232,7 @@ def fake_cupy(devices: int = 1) -> Any:
         asnumpy=np.array, full=lambda *a: np.full(*a).view(Array), empty=lambda *a: np.full(*a[:1], 77, *a[1:]).view(Array),
         get_default_memory_pool=lambda: types.SimpleNamespace(free_all_blocks=lambda: None),
         zeros=lambda *a: np.zeros(*a).view(Array), flatnonzero=lambda a: np.flatnonzero(a).view(Array), argsort=lambda a: np.argsort(a).view(Array),
+        sort=lambda a: np.sort(a).view(Array), searchsorted=lambda a, b: np.searchsorted(a, b).view(Array), concatenate=lambda a: np.concatenate(a).view(Array),
     )  # fmt: skip
 
 

@@ -69,6 +69,8 @@ void BatchCounts::add(const BatchCounts& other) {
     subsurface_walks += other.subsurface_walks;
     subsurface_steps += other.subsurface_steps;
     flights += other.flights;
+    photons += other.photons;
+    photons_landed += other.photons_landed;
 }
 
 BatchCounts Batch::counts() const {

@@ -32,6 +32,7 @@ struct BatchCounts {
     u64 light_points = 0;       // points on lights at which a program ran
     u64 subsurface_walks = 0, subsurface_steps = 0;
     u64 flights = 0;            // ways of rays through media
+    u64 photons = 0, photons_landed = 0;  // started; records that they left
 
     void add(const BatchCounts& other);
 };
@@ -54,6 +55,10 @@ class Batch {
     // Traces block.width * block.height * block.sample_count <= BATCH_PATHS paths to their ends, into the
     // rows of the block's pixels. Told to stop, leaves them as they were: a batch may take seconds.
     void trace(const PixelBlock& block);
+
+    // Starts photons [first, first + count), count <= BATCH_PATHS, of a map (its first sample), and appends the records
+    // that they leave, in no order.
+    void trace_photons(u32 map, u32 first, u32 count, std::vector<Photon>* landed);
 
     BatchCounts counts() const;
 
@@ -88,6 +93,10 @@ class Batch {
     bool enters_subsurface(u32 k, int lane, const ClosureSet& set, const SurfacePoint& spawn, Vec3 u);
     void walk_subsurface();
     void shade_exits(u32 material, const u32* queue, int count);
+
+    // photons.cpp
+    void shade_photons(u32 material, const u32* queue, int count, std::vector<Photon>* landed);
+    void gather(const u32* queue, int lit_count);
 
     // direct_light.cpp
     void sample_lights(const u32* queue, int lit_count);

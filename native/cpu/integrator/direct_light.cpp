@@ -53,7 +53,7 @@ void Batch::sample_lights(const u32* queue, int lit_count) {
         int lane = wanted[i];
         u32 path = ray_path_[queue[lane]];
         Ray& ray = shadow_rays_[shadow_count_];
-        bool made = make_shadow_ray(writer_.film.layout, paths_[path], path, points, lane, scratch_->sets[lane],
+        bool made = make_shadow_ray(scene_, writer_.film.layout, paths_[path], path, points, lane, scratch_->sets[lane],
                                     scratch_->spawn[lane], scratch_->samples[lane], scratch_->emission[lane], &ray,
                                     &shadows_[shadow_count_]);
         if (made && scene_.has_media)

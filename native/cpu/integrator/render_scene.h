@@ -3,6 +3,8 @@
 #include <vector>
 
 #include "cpu/accel/accel.h"
+#include "cpu/integrator/casters.h"
+#include "cpu/integrator/photon_map.h"
 #include "luch/integrator/render_view.h"
 
 namespace luch::cpu {
@@ -18,6 +20,9 @@ struct RenderScene : RenderView {
     std::vector<TransformKey> camera_keys;
     std::vector<float> shutter_times;
     size_t max_registers = 0;  // of any program
+    CasterStore casters_store;
+    PhotonPilot photon_pilot;
+    PhotonStore photon_store;  // the map that serves the samples under way
 
     RenderScene() : RenderView{} {}
 };

@@ -7,6 +7,7 @@
 #include "cpu/accel/scene_plan.h"
 #include "cpu/shade/interpreter.h"
 #include "cpu/sky/world_sun.h"
+#include "luch/integrator/photon.h"
 #include "luch/shade/surface_setup.h"
 
 namespace luch::cpu {
@@ -73,6 +74,7 @@ void Renderer::build_all() {
     find_constants();
     build_lights();
     place_media();
+    find_casters();
     make_batches();
 }
 
@@ -136,6 +138,7 @@ DeviceImage Renderer::device_image() {
     input_.media.describe(image, block, task_.scene.media);
     image.add_array("camera", block, task_.scene.view.camera, 1);
     image.add_array("filter", block, task_.scene.filter, 1);
+    if (task_.scene.photon_maps) scene_.casters_store.describe(image, block, task_.scene.casters);
     if (task_.scene.local_trees) local_trees_->describe(image, block, task_.scene.local_trees);
     if (task_.scene.shutter) {
         u32 shutter = image.add_array("shutter", block, task_.scene.shutter, 1);
@@ -284,8 +287,6 @@ bool Renderer::trace_tiles(int halves, const SamplesOf& samples_of) {
     const int width = int(film.width), height = int(film.height);
     const size_t columns = size_t((width + TILE_SIZE - 1) / TILE_SIZE);
     const u32 at_once = u32(halves) * SAMPLES_PER_BATCH;
-    tiles_total_ = tile_count() * u64(halves);
-    tiles_done_.store(0);
     double start = seconds_now();
     auto trace = [&](size_t begin, size_t end, unsigned worker) {
         for (size_t i = begin; i < end; i++) {
@@ -306,7 +307,7 @@ bool Renderer::trace_tiles(int halves, const SamplesOf& samples_of) {
         }
     };
     try {
-        pool_.parallel_for(size_t(tiles_total_), 1, trace);
+        pool_.parallel_for(tile_count() * size_t(halves), 1, trace);
     } catch (const Cancelled&) {  // the film holds what was traced
     }
     stats_.trace_seconds += seconds_now() - start;
@@ -314,13 +315,82 @@ bool Renderer::trace_tiles(int halves, const SamplesOf& samples_of) {
 }
 
 bool Renderer::render(u32 first, u32 count) {
-    return trace_tiles(1, [&](size_t) { return Samples{first, count}; });
+    const u32 end = first + count;
+    u64 maps = 1;
+    for (u32 s = first; scene_.photon_maps && s + samples_of_map(s, end - s) < end; s += samples_of_map(s, end - s))
+        maps++;
+    tiles_total_ = tile_count() * maps;
+    tiles_done_.store(0);
+    while (first < end) {
+        const u32 samples = scene_.photon_maps ? samples_of_map(first, end - first) : end - first;
+        if (scene_.photon_maps && !make_photon_map(first)) return false;
+        if (!trace_tiles(1, [&](size_t) { return Samples{first, samples}; })) return false;
+        first += samples;
+    }
+    return !cancelled_.load();
 }
 
 bool Renderer::render_regions(const std::vector<u32>& begins, const std::vector<u32>& ends) {
     if (begins.size() != 2 * tile_count() || ends.size() != begins.size())
         throw std::invalid_argument("Renderer: two regions for each tile are needed.");
+    if (scene_.photon_maps) throw std::invalid_argument("Renderer: with photon maps all pixels have the same samples.");
+    tiles_total_ = tile_count() * 2;
+    tiles_done_.store(0);
     return trace_tiles(2, [&](size_t i) { return Samples{begins[i], ends[i] > begins[i] ? ends[i] - begins[i] : 0u}; });
+}
+
+// Volumes scatter photons on their way, which nobody follows there: scenes with them stay with paths.
+void Renderer::find_casters() {
+    if (!input_.photon_maps || scene_.has_media || !scene_.has_lights) return;
+    scene_.casters_store.build(scene_.view, store_->materials(), scene_.max_registers, pool_);
+    scene_.casters = scene_.casters_store.view();
+    scene_.photon_maps = scene_.casters.count > 0;
+}
+
+// The photons of so many starts, in their order; false when cancelled.
+bool Renderer::trace_map(u32 map, u32 starts, std::vector<Photon>* landed) {
+    const size_t pieces = (starts + BATCH_PATHS - 1) / BATCH_PATHS;
+    std::vector<std::vector<Photon>> of_pieces(pieces);
+    try {
+        pool_.parallel_for(pieces, 1, [&](size_t begin, size_t end, unsigned worker) {
+            for (size_t i = begin; i < end && !cancelled_.load(std::memory_order_relaxed); i++) {
+                const u32 first = u32(i) * u32(BATCH_PATHS);
+                batches_[worker]->trace_photons(map, first, std::min(u32(BATCH_PATHS), starts - first), &of_pieces[i]);
+                std::sort(of_pieces[i].begin(), of_pieces[i].end(),
+                          [](const Photon& a, const Photon& b) { return photon_order(a) < photon_order(b); });
+            }
+        });
+    } catch (const Cancelled&) {
+        return false;
+    }
+    for (const std::vector<Photon>& piece : of_pieces) landed->insert(landed->end(), piece.begin(), piece.end());
+    return !cancelled_.load();
+}
+
+// The map that serves a sample, unless it is at hand. False when cancelled.
+bool Renderer::make_photon_map(u32 sample) {
+    const u32 map = first_of_map(sample);
+    if (map == map_sample_) return true;
+    const double start = seconds_now();
+    const u64 pixels = u64(film_->view().width) * film_->view().height;
+    const u32 starts = starts_for(pixels);
+    std::vector<Photon> landed;
+    if (!has_pilot_) {
+        if (!trace_map(PILOT_MAP, pilot_starts_for(pixels), &landed)) return false;
+        scene_.photon_pilot.build(landed, pixels, scene_.casters.reach);
+        has_pilot_ = true;
+        landed.clear();
+    }
+    const u32 all = starts * samples_of_map(map, MOST_SAMPLES_OF_MAP);
+    if (!trace_map(map, all, &landed)) return false;
+    const PhotonMap described = scene_.photon_pilot.map(map, all, landed.size());
+    scene_.photon_store.build(described, std::move(landed), pool_);
+    scene_.photons = scene_.photon_store.view();
+    map_sample_ = map;
+    stats_.photon_maps++;
+    stats_.photon_radius = scene_.photons.levels[0].radius;
+    stats_.photon_seconds += seconds_now() - start;
+    return true;
 }
 
 double Renderer::step_progress() const { return double(tiles_done_.load()) / double(std::max<u64>(tiles_total_, 1)); }

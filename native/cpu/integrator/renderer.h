@@ -64,6 +64,7 @@ struct RenderInput : ViewInput {
     int world_map_width = 0;  // of the importance map, 0: no map
     std::vector<Color> material_emission_estimate;
     bool light_tree = true;
+    bool photon_maps = false;  // caustics by photons
     AccelRequest accel;
     bool for_device = false;  // another device traces: no structures of this processor, no batches
     u64 device_builds_from = ~u64(0);  // triangles of a group whose tree that device builds itself
@@ -80,7 +81,9 @@ struct RenderStats {
     AccelStats accel;
     std::string accel_name, accel_reason;
     u32 accel_builds = 0;  // for this picture: 0 where another's structures served
-    double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0;
+    double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0, photon_seconds = 0.0;
+    u64 photon_maps = 0;
+    float photon_radius = 0.0f;  // of the last map's finest level, metres
     u64 scene_bytes = 0;
     u64 local_tree_bytes = 0;  // trees of what scatters under its surface
     u64 film_pixel_bytes = 0;  // what the film keeps of one pixel
@@ -162,6 +165,9 @@ class Renderer {
     void make_batches();
     void find_constants();
     void build_lights();
+    void find_casters();
+    bool trace_map(u32 map, u32 starts, std::vector<Photon>* landed);
+    bool make_photon_map(u32 sample);
     void mark_in_world();
     WorldSun find_sun(WorldInput& world);  // and tells the world of it
     std::vector<float> world_map(int width, int height, const WorldSun& sun);
@@ -181,6 +187,8 @@ class Renderer {
     std::atomic<bool> cancelled_{false};
     std::atomic<u64> tiles_done_{0};
     u64 tiles_total_ = 1;
+    bool has_pilot_ = false;     // of photons
+    u32 map_sample_ = NONE;      // the first of those that the photons at hand serve
     RenderStats stats_;
 };
 

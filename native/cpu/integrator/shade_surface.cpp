@@ -25,6 +25,7 @@ void Batch::shade_chunk(u32 material_index, const u32* queue, int count) {
     if (lit_count == 0) return;
     draw_numbers(queue, lit_count);
     if (scene_.has_lights) sample_lights(queue, lit_count);
+    gather(queue, lit_count);
     const auto& u = scratch_->scatter_u;
     for (int i = 0; i < lit_count; i++) {
         int lane = scratch_->lit_lanes[i];

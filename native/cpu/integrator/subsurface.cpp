@@ -81,6 +81,7 @@ void Batch::shade_exits(u32 material_index, const u32* queue, int count) {
     }
     draw_numbers(rays, count);
     if (scene_.has_lights) sample_lights(rays, count);
+    gather(rays, count);
     const auto& u = scratch_->scatter_u;
     for (int lane = 0; lane < count; lane++) {
         u32 path = ray_path_[rays[lane]];

@@ -52,6 +52,7 @@ void Renderer::look() {
     scene_.filter_table = input_.filter;
     scene_.filter = &scene_.filter_table;
     scene_.limits = input_.limits;
+    if (input_.photon_maps) scene_.limits.filter_glossy = 0.0f;  // it blurs for want of photons
     scene_.seed = input_.seed;
     scene_.sampler = input_.sampler;
     scene_.first_sample = input_.first_sample;
@@ -119,6 +120,7 @@ void Renderer::set_view(const ViewInput& view) {
     look();
     if (world_reads_camera_) build_lights();
     place_media();
+    map_sample_ = NONE, has_pilot_ = false;
     make_batches();
 }
 

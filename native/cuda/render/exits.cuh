@@ -1,5 +1,6 @@
 // The stage at a surface where a walk under it comes out: lit and scattered as from a white diffuse one.
 #pragma once
+#include "luch/integrator/photon.h"
 #include "luch/integrator/subsurface.h"
 #include "render/onward.cuh"
 
@@ -26,6 +27,11 @@ __device__ __forceinline__ void shade_exit(const RenderTask& task, const Subsurf
     }
     setup_exit(set, points, 0, normal);
     if (scene.has_lights) light_surface(task, path, slot, points, set, spawn);
+    if constexpr (plan::PHOTONS) {
+        FilmWriter writer = film_of_slot(task, slot);
+        add_photons(scene, writer, path, points, 0, set);
+        add_totals(wave, writer);
+    }
     send_on(task, path, slot, points, set, spawn, -walk.direction, 0.0f);
     store_path(wave, slot, path);
 }

@@ -44,7 +44,8 @@ __device__ __forceinline__ void light_surface(const RenderTask& task, const Path
     Color emission = sampled_emission(task, path, slot, sample, points.footprint[0], lane_time(points, 0));
     Ray ray;
     ShadowRay shadow;
-    if (make_shadow_ray(task.film.layout, path, slot, points, 0, set, spawn, sample, emission, &ray, &shadow))
+    if (make_shadow_ray(task.scene, task.film.layout, path, slot, points, 0, set, spawn, sample, emission, &ray,
+                        &shadow))
         push_shadow(task, slot, points, ray, shadow);
 }
 

@@ -3,6 +3,7 @@
 #define LUCH_PLAN_CURVES 1  // which material a hit has
 #include "luch/film/read.h"
 #include "luch/integrator/camera_path.h"
+#include "luch/integrator/photon_map.h"
 #include "luch/integrator/wavefront.h"
 #include "render/launch.cuh"
 
@@ -109,6 +110,23 @@ extern "C" __global__ void next_round(const __grid_constant__ luch::RenderTask t
     if (threadIdx.x != 0) return;
     wave.counters[WAVE_RAYS] = wave.counters[WAVE_NEXT_RAYS];
     for (u32 c = WAVE_NEXT_RAYS; c < WAVE_COUNTERS; ++c) wave.counters[c] = 0;
+}
+
+// Of every photon its bucket, and its number below: what a level is sorted by.
+extern "C" __global__ void bucket_photons(const luch::Photon* photons, const u32 count, const float inverse_cell,
+                                          const u32 mask, luch::u64* keys) {
+    using namespace luch;
+    u32 i = stage_index();
+    if (i < count) keys[i] = u64(bucket_of(cell_of(photons[i].point, inverse_cell), mask)) << 32 | i;
+}
+
+extern "C" __global__ void place_photons(const luch::Photon* photons, const u32 count, const luch::u64* keys,
+                                         luch::PhotonPlace* places) {
+    using namespace luch;
+    u32 i = stage_index();
+    if (i >= count) return;
+    u32 photon = u32(keys[i]);
+    places[i] = {photons[photon].point, photon};
 }
 
 // Adds the layers [1, layers) to layer 0 and empties them: one thread a pixel.

@@ -12,5 +12,6 @@
 #include "render/exits.cuh"
 #include "render/light.cuh"
 #include "render/media.cuh"
+#include "render/photons.cuh"
 #include "render/shadow.cuh"
 #include "render/surface.cuh"

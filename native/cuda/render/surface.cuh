@@ -1,5 +1,6 @@
 // The stage at a surface: its program, its emission, what it tells the film, a light for it, and where the path goes.
 #pragma once
+#include "luch/integrator/photon.h"
 #include "render/onward.cuh"
 #include "render/subsurface.cuh"
 
@@ -48,6 +49,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
     run_program(context_of(scene.view, material.program, points, set, aovs));
     if (meet_surface(scene, writer, path, points, 0, set, material_index, aovs)) {
         if (scene.has_lights) light_surface(task, path, slot, points, set, spawn);
+        add_photons(scene, writer, path, points, 0, set);
         if (wants_ao(task.film.layout, path)) {
             Ray ao_ray;
             ShadowRay ao;

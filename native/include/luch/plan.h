@@ -97,6 +97,9 @@
 #ifndef LUCH_PLAN_MOTION
 #define LUCH_PLAN_MOTION 1
 #endif
+#ifndef LUCH_PLAN_PHOTONS
+#define LUCH_PLAN_PHOTONS !LUCH_CUDA  // kernels that ask for photons are compiled again for scenes that want them
+#endif
 #ifndef LUCH_PLAN_TIME
 #define LUCH_PLAN_TIME 1
 #endif
@@ -180,6 +183,7 @@ inline constexpr bool SUBSURFACE = LUCH_PLAN_SUBSURFACE;  // other than of thin 
 inline constexpr bool BENT_EXITS = LUCH_PLAN_BENT_EXITS;  // of walks under surfaces whose program bends the normal
 inline constexpr bool VOLUMES = LUCH_PLAN_VOLUMES;
 inline constexpr bool MOTION = LUCH_PLAN_MOTION;  // of the camera, of objects, of their shapes
+inline constexpr bool PHOTONS = LUCH_PLAN_PHOTONS;  // photon maps (integrator/caustics.h)
 inline constexpr bool TIME = LUCH_PLAN_TIME;      // the Render Time pass
 inline constexpr bool COAT = LUCH_PLAN_COAT;
 inline constexpr bool METALS = LUCH_PLAN_METALS;  // Metallic and Principled's metal, by the tint at 82 degrees

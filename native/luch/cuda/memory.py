@@ -172,6 +172,18 @@ class Memory:
     def _set(self, name: str, kind: str, value: int) -> None:
         struct.pack_into(kind, self._task, self._fields[name], value)
 
+    def lend(self, room: Any, count: Any) -> None:
+        """Where photons land: records, and how many there are, on the device."""
+        self.place("wave.landed", struct.pack("<Q", room.data.ptr))
+        self.place("wave.landed_count", struct.pack("<Q", count.data.ptr))
+        self.place("wave.landed_room", struct.pack("<I", len(room)))
+
+    def place(self, name: str, data: bytes) -> None:
+        """Into the tasks of both turns."""
+        at = self._fields[name]
+        self._task[at : at + len(data)] = data
+        self.tasks = [task[:at] + data + task[at + len(data) :] for task in self.tasks]
+
     def address(self, name: str) -> int:
         """Of an array on the device; 0 if this scene needs no such array."""
         return int(self.arrays[name].data.ptr) if name in self.arrays else 0

@@ -22,6 +22,7 @@ from luch.cuda.compiler import NotWanted, load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.host import HostFilm, HostScene
 from luch.cuda.memory import NONE, RAY_CAMERA, Beside, Memory, bytes_per_path
+from luch.cuda.photons import PhotonMaps, bytes_of_maps
 from luch.cuda.plan import sampler_flags
 from luch.cuda.scene_kernels import SceneKernels
 from luch.cuda.timing import TIMED, StageClocks
@@ -49,11 +50,16 @@ TOTALS = ("surface_points", "transparent_steps", "transparent_rays", "world_poin
 Part = tuple[Any, int, int]
 
 
-def parted(first: int, count: int, most: int) -> Iterator[tuple[int, int]]:
-    """Samples [first, first + count) as (first, count) of at most so many, none across a power of two: marks lie there."""
+def parted(first: int, count: int, most: int, by_maps: bool = False) -> Iterator[tuple[int, int]]:
+    """Samples [first, first + count) as (first, count) of at most so many, none across a power of two: marks lie there.
+
+    by_maps: each of one photon map.
+    """
     end = first + count
     while first < end:
         count = min(most, end - first, (1 << first.bit_length()) - first)
+        if by_maps:
+            count = core.render.samples_of_map(first, count)
         yield first, count
         first += count
 
@@ -84,6 +90,7 @@ class DeviceRenderer(HostFilm):
         super().__init__(host or HostScene(scene))
         self._lock = threading.Lock()
         self._held: Memory | None = None
+        self._photons: PhotonMaps | None = None
         self._stages: SceneKernels
         self._timed = "Render Time" in scene.film.passes
         self.warnings: list[str] = []
@@ -151,7 +158,7 @@ class DeviceRenderer(HostFilm):
         """Gives the wavefront's and the film's memory back; set_view() takes it again. Passes are to be read before."""
         with self._device:
             enter_context()
-            self._held = None
+            self._held = self._photons = None
             cupy().get_default_memory_pool().free_all_blocks()
 
     def origin_reach(self) -> float:
@@ -189,16 +196,24 @@ class DeviceRenderer(HostFilm):
         self._most_rounds = int(facts["most_rounds"])
         self._media = facts["media"] and bool(self._stages.plan["VOLUMES"])
         self._transparent = bool(facts["transparent"])
+        self._photons = None
         beside = Beside(self._walks is not None, self._media, facts["moves"], self._timed, self._transparent)
         pixels, held = self._scene.film.pixels, self._held
         if held is not None and held.serves(self._arrays.root, beside):
             wanted = self._wanted_paths(pixels)
             if (wanted <= held.held or held.all_that_fits) and held.restart(self._arrays.root, pixels, wanted):
+                self._begin_maps(facts)
                 return
         if held is not None:
             held = None
             self.rest()  # the free memory is asked for below
-        self._held = self._allocate(pixels, max(1, facts["materials"]), beside)
+        self._held = self._allocate(pixels, max(1, facts["materials"]), beside, facts["photon_maps"])
+        self._begin_maps(facts)
+
+    def _begin_maps(self, facts: dict[str, Any]) -> None:
+        if facts["photon_maps"] and self._stages.plan["PHOTONS"]:
+            self._photons = PhotonMaps(self._memory, self._paths, self._stages, self._tracer, self._most_rounds, facts,
+                                       lambda: not self._cancelled)  # fmt: skip
 
     @staticmethod
     def _paths_that_fill() -> int:
@@ -239,10 +254,12 @@ class DeviceRenderer(HostFilm):
         budget = self._scene.settings.texture_memory
         return images_to_leave(blocks, min(room, int(budget * 1e6)) if budget > 0 else room)
 
-    def _allocate(self, pixels: int, materials: int, beside: Beside) -> Memory:
+    def _allocate(self, pixels: int, materials: int, beside: Beside, photons: bool) -> Memory:
         """As large a wavefront as the device's memory allows, up to MOST_PATHS."""
         cp = cupy()
         free, _ = cp.cuda.runtime.memGetInfo()
+        if photons:
+            free -= min(free // 2, bytes_of_maps(pixels))
         fields, root = core.render.task_fields(), self._arrays.root
         stride = struct.unpack_from("<I", root, fields["film.layout.stride"])[0]
         fits = int((free * MEMORY_SHARE - pixels * (8 * stride + 4)) / bytes_per_path(stride, beside))
@@ -286,6 +303,8 @@ class DeviceRenderer(HostFilm):
             with self._lock:
                 if wave[0] == 0:
                     self._memory.mark(wave[2], pixels)
+                if self._photons is not None and not self._photons.serve(wave[2]):
+                    break
                 self._trace_wave(*wave, pixels)
             self._waves_done += 1
         cupy().cuda.get_current_stream().synchronize()
@@ -299,7 +318,7 @@ class DeviceRenderer(HostFilm):
         for pixels, first, count in work:
             listed = _on_device(pixels)
             total = memory.pixels if listed is None else len(listed)
-            for sample, samples in parted(first, count, memory.layers):
+            for sample, samples in parted(first, count, memory.layers, self._photons is not None):
                 for pixel in range(0, total, memory.layer_pixels):
                     yield listed, (pixel, min(memory.layer_pixels, total - pixel), sample, samples)
 
@@ -337,14 +356,8 @@ class DeviceRenderer(HostFilm):
     def _trace_round(self, turn: int, rays: int) -> int:
         """One event of every path; returns how many shadow rays were cast."""
         memory, paths, stages = self._memory, self._paths, self._stages
-        following = "next_" if turn else ""
-        own_rays = memory.address(f"{following}rays")
-        kinds = memory.address("next_kind" if turn else "ray_kind")
         with self._clock("closest"):
-            self._tracer.closest(own_rays, kinds, memory.address("hits"), memory.counter("rays"),
-                                 memory.counter("traced"), memory.near_movers.data.ptr,
-                                 memory.address("next_time" if turn else "ray_time"),
-                                 memory.address("ray_ticks"))  # fmt: skip
+            self._tracer.closest_of_wave(memory, turn)
         shadows = 0
         if self._media:
             with self._clock("media"):
@@ -466,6 +479,10 @@ class DeviceRenderer(HostFilm):
         """Counts, bytes and seconds, under the names of the CPU's."""
         return {**self._host.core.stats(), **self.own_stats()}
 
+    def _photon_stats(self) -> dict[str, Any]:
+        maps = self._photons
+        return {} if maps is None else {**maps.stats, "photon_map_bytes": maps.held_bytes}
+
     def _shading_kernel(self) -> dict[str, float]:
         """What the dearest stage takes of a multiprocessor."""
         told = self._stages.kernel("shade_surfaces").properties(BLOCK)
@@ -483,18 +500,22 @@ class DeviceRenderer(HostFilm):
         totals["non_finite_samples"] = sum(totals[cause] for cause in REFUSALS)
         counts = {**self._counts, **totals}
         counts["shadow_rays"] += counts.pop("transparent_rays")
-        return counts | {
-            "trace_seconds": self._trace_seconds,
-            "upload_seconds": self._upload_seconds,
-            "device_scene_bytes": self._arrays.bytes + self._tracer.bytes,
-            "device_film_and_paths_bytes": self._memory.bytes,
-            "paths_at_once": self._memory.slots,
-            "paths_to_fill": self._paths_that_fill(),
-            "path_bytes": core.render.task_sizes()["path"],
-            "kernel_plan": self._stages.plan,
-            "shading_kernel": shading,
-            "kernels": "general" if self._stages.general else "the scene's own",
-            "kernels_settled": self._stages.settled,
-            "general_kernels": self._stages.has_general,  # whether there are such that serve this scene
-            "kernel_compile_seconds": self._stages.compile_seconds,
-        }
+        return (
+            counts
+            | self._photon_stats()
+            | {
+                "trace_seconds": self._trace_seconds,
+                "upload_seconds": self._upload_seconds,
+                "device_scene_bytes": self._arrays.bytes + self._tracer.bytes,
+                "device_film_and_paths_bytes": self._memory.bytes,
+                "paths_at_once": self._memory.slots,
+                "paths_to_fill": self._paths_that_fill(),
+                "path_bytes": core.render.task_sizes()["path"],
+                "kernel_plan": self._stages.plan,
+                "shading_kernel": shading,
+                "kernels": "general" if self._stages.general else "the scene's own",
+                "kernels_settled": self._stages.settled,
+                "general_kernels": self._stages.has_general,  # whether there are such that serve this scene
+                "kernel_compile_seconds": self._stages.compile_seconds,
+            }
+        )

@@ -89,6 +89,7 @@ class SceneKernels:
         architecture = architecture_of(cupy())
         usable = facts["structure"] == "CWBVH" and facts["registers"] <= INTERPRETER_REGISTERS
         usable = usable and not self.plan["TIME"]  # the clocks of other code would tell other prices
+        usable = usable and not self.plan["PHOTONS"]  # which general kernels lack
         flags = compiler.ready_made(STAGES)[0]
         general = compiler.ahead_file(STAGES, self._precision, architecture, flags) if usable else None
         self.has_general = general is not None

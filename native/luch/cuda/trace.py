@@ -11,6 +11,7 @@ import numpy as np
 from luch.cuda.builder import MAX_DEPTH, build_cwbvh_of
 from luch.cuda.compiler import load
 from luch.cuda.device import DeviceError, Kernel, cupy
+from luch.cuda.memory import Memory
 from luch.cuda.plan import curve_flags
 from luch.cuda.upload import Blocks, DeviceCopy, Links
 
@@ -103,6 +104,14 @@ class SceneTracer:
         noted that may meet what moves, or 0 where nothing does; times: float32 each, or 0; ticks: uint32 each, or 0.
         """
         self._launch(self._closest, rays, kinds, hits, 0, count, following, times, ticks, near)
+
+    def closest_of_wave(self, memory: Memory, turn: int) -> None:
+        """The same of all rays under way in a wavefront's round."""
+        following = "next_" if turn else ""
+        self.closest(memory.address(f"{following}rays"), memory.address("next_kind" if turn else "ray_kind"),
+                     memory.address("hits"), memory.counter("rays"), memory.counter("traced"),
+                     memory.near_movers.data.ptr, memory.address("next_time" if turn else "ray_time"),
+                     memory.address("ray_ticks"))  # fmt: skip
 
     def any(self, rays: int, kinds: int, blocked: int, count: int, following: int, near: int, times: int = 0,
             ticks: int = 0) -> None:  # fmt: skip

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from luch.effects.lights import LAMPS
 from luch.effects.shown import Shown
 from luch.effects.surfaces import facts
 from luch.effects.table import Effects
 from luch.effects.volumes import add_volume_bounces
-from luch.scene import PANORAMAS, Film, Mesh
+from luch.scene import PANORAMAS, Film, Mesh, Settings
 
 _SUM_BYTES = 8  # a number of the film is a double
 # Pass -> numbers of its own that a pixel keeps.
@@ -168,6 +169,7 @@ def _add_limits(effects: Effects, shown: Shown, diffuse: bool, glossy: bool) -> 
         on = wanted and able
         off = f"Caustics > {label} is disabled" if able else "they need diffuse bounces and such a surface"
         effects.add("Paths", name, on, "diffuse surfaces may be lit by way of such a surface" if on else off)
+    _add_photon_maps(effects, settings)
     clamps = [
         f"{label} light above {limit:g} is cut"
         for label, limit in (("direct", settings.clamp_direct), ("indirect", settings.clamp_indirect))
@@ -177,9 +179,33 @@ def _add_limits(effects: Effects, shown: Shown, diffuse: bool, glossy: bool) -> 
         "Paths", "clamping", bool(clamps), ", ".join(clamps) or "both limits are 0", cost="loses light" * bool(clamps)
     )
     blur = settings.filter_glossy
-    on = blur > 0.0 and (glossy or through)
-    off = "nothing reflects or transmits" if blur > 0.0 else "Filter Glossy is 0"
+    mapped = effects["photon maps"].on
+    on = blur > 0.0 and (glossy or through) and not mapped
+    off = (
+        "photon maps need none"
+        if mapped and blur
+        else "nothing reflects or transmits"
+        if blur
+        else "Filter Glossy is 0"
+    )
     effects.add("Paths", "filter glossy", on, f"Filter Glossy is {blur:g}" if on else off)
+
+
+_PHOTONS = "caustics of surfaces smoother than a roughness of .32 are brought by photons"
+
+
+def _add_photon_maps(effects: Effects, settings: Settings) -> None:
+    lit = any(effects[name].on for name in (*LAMPS.values(), "emissive meshes", "world light sampling"))
+    caustics = any(effects[f"{kind} caustics"].on for kind in ("reflective", "refractive"))
+    if settings.integrator != "PHOTON":
+        off = "the integrator is another"
+    elif effects["volumes"].on:
+        off = "the scene has volumes, through which no photon is followed: paths find all light"
+    else:
+        off = "no light can be chosen to send photons from" if caustics else "there are no caustics"
+    on = settings.integrator == "PHOTON" and not effects["volumes"].on and caustics and lit
+    cost = "photons are traced for every few samples, and gathered at every point" if on else ""
+    effects.add("Paths", "photon maps", on, _PHOTONS if on else off, cost=cost)
 
 
 def add_film(effects: Effects, shown: Shown) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 from luch import denoise, samplers
 from luch.effects import Effects
 from luch.effects.removal import REMOVALS
+from luch.integrators import INTEGRATORS
 from luch.scene import Scene, Settings
 
 EXACT, AS_SET = "exact", "as set"
@@ -101,6 +102,7 @@ def plan(
     _add_structures(variants, absent, settings, accelerator, triangles)
     _add_precisions(variants, settings)
     _add_samplers(variants, settings)
+    _add_integrators(variants, absent, settings, on)
     _add_bounces(variants, absent, settings, on)
     _add_shortcuts(variants, settings, on)
     _add_light_sampling(variants, absent, settings, on)
@@ -137,6 +139,16 @@ def _add_samplers(variants: list[Variant], settings: Settings) -> None:
     for name, family in samplers.FAMILIES.items():
         if name != settings.sampler:
             variants.append(Variant(f"{family.title} sampler", "Samplers", family.reason, {"sampler": name}, rank=4))
+
+
+def _add_integrators(variants: list[Variant], absent: list[str], settings: Settings, on: set[str]) -> None:
+    if not on & {"reflective caustics", "refractive caustics"} or "volumes" in on:
+        absent.append("Photon maps: the scene has no caustics, or volumes through which no photon is followed.")
+        return
+    for name, kind in INTEGRATORS.items():
+        if name != settings.integrator:
+            variants.append(Variant(kind.title.lower(), "Integrators", kind.reason, {"integrator": name}, biased=True,
+                                    rank=1))  # fmt: skip
 
 
 def _add_bounces(variants: list[Variant], absent: list[str], settings: Settings, on: set[str]) -> None:

@@ -99,19 +99,24 @@ LUCH_FN Vec3 shadow_ray_origin(const ShadePoints& points, int lane, SurfacePoint
 }
 
 // The ray to the sampled light and what it brings; false where that is nothing. emission: of the light's program.
-LUCH_FN bool make_shadow_ray(const FilmLayout& layout, const PathState& path, u32 path_index, const ShadePoints& points,
-                             int lane, const ClosureSet& set, const SurfacePoint& spawn, const LightSample& s,
-                             Color emission, Ray* ray, ShadowRay* shadow) {
+LUCH_FN bool make_shadow_ray(const RenderView& scene, const FilmLayout& layout, const PathState& path, u32 path_index,
+                             const ShadePoints& points, int lane, const ClosureSet& set, const SurfacePoint& spawn,
+                             const LightSample& s, Color emission, Ray* ray, ShadowRay* shadow) {
     Color light = emission * s.radiance;
     if (is_zero(light)) return false;
     Vec3 ng = lane_face_normal(points, lane);
     float bsdf_pdf = 0.0f;
-    BsdfValue value = eval_closures(set, ng, lane_to_viewer(points, lane), s.direction, &bsdf_pdf);
+    BsdfValue value;
+    if (has_photons(scene))
+        value = eval_parts(path, set, casts_caustics(scene.view, points.instance[lane], points.prim[lane]), ng,
+                           lane_to_viewer(points, lane), s.direction, s.pdf_sa, s.mis);
+    else
+        value = eval_closures(set, ng, lane_to_viewer(points, lane), s.direction, &bsdf_pdf);
     Color reflected = only(value, s.visibility);
     if (is_zero(reflected)) return false;
     float lobes = lobe_weight_sum(set);
     bsdf_pdf *= lobes / (lobes + average(set.transparent));
-    float weight = (s.mis ? mis_weight(s.pdf_sa, bsdf_pdf) : 1.0f) / s.pdf_sa;
+    float weight = (s.mis ? mis_weight(s.pdf_sa, bsdf_pdf) : 1.0f) / s.pdf_sa;  // of parts, they have theirs already
     ray->origin = shadow_ray_origin(points, lane, spawn, s.direction);
     ray->t_min = 0.0f;
     ray->direction = s.direction;

@@ -1,6 +1,7 @@
 // Light that a path finds by itself beside surfaces: lamps on its way, suns and the world where it leaves the scene.
 #pragma once
 #include "luch/integrator/accumulate.h"
+#include "luch/integrator/caustics.h"
 #include "luch/light/closest_lamp.h"
 #include "luch/light/sample.h"
 
@@ -33,6 +34,8 @@ template <class Shader>
 LUCH_FN void add_lamp(const RenderView& scene, FilmWriter& writer, const PathState& path, const LampHit& hit,
                       const Ray& ray, const MediumStack* stack, Shader& shader, ShadePoints& points) {
     float pdf = 0.0f;
+    if (is_caustic(path) && pdf_lamp(scene.view, path.mis_origin, path.mis_normal, true, hit, ray.direction) > 0.0f)
+        return;
     if (!(path.flags & PATH_NO_MIS)) {
         pdf =
             pdf_lamp(scene.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, hit, ray.direction);
@@ -92,6 +95,7 @@ LUCH_FN void setup_world_lane(const PathState& path, Vec3 direction, ShadePoints
 LUCH_FN void add_world(const RenderView& scene, FilmWriter& writer, const PathState& path, Vec3 direction,
                        Color radiance) {
     float pdf = 0.0f;
+    if (is_caustic(path) && pdf_world(scene.view, path.mis_origin, path.mis_normal, true, direction) > 0.0f) return;
     if (!(path.flags & PATH_NO_MIS)) {
         pdf = pdf_world(scene.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, direction);
     }

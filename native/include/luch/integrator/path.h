@@ -22,6 +22,9 @@ enum PathMemory : u32 {
     PATH_FEATURES = 1u << 23,                // denoising features are still to be written
     PATH_MIS_TRANSMITS = 1u << 24,           // the surface left last could be lit from behind
     PATH_VOLUME_PASS = 1u << 25,             // the bounce that chose its light pass was in a volume
+    // With photon maps alone (integrator/caustics.h):
+    PATH_AFTER_ROUGH = 1u << 26,             // it has been at a surface where photons are gathered
+    PATH_CAUSTIC = 1u << 27,                 // and only by sharp bounces since: light it finds now photons bring
 };
 
 struct PathState {

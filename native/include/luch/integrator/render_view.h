@@ -21,6 +21,57 @@ struct ConstantEmission {
 
 struct LocalTreesView;  // accel/local_trees.h
 
+// A photon where it lies.
+struct alignas(16) Photon {
+    Vec3 point;      // world
+    u32 start;       // the number of its path
+    Vec3 normal;     // of the face, unit, on the side that it came to
+    u32 lightgroup;
+    Vec3 direction;  // unit, to where it came from
+    u32 bounce;      // surfaces that threw it here
+    Color power;     // W, of all starts of its map
+    u32 unused;
+};
+
+// Where a photon is among those of its bucket: what a search reads.
+struct alignas(16) PhotonPlace {
+    Vec3 point;
+    u32 photon;  // its number
+};
+
+// Photons by cells of a grid, those of a bucket together; several cells may share one. Levels differ in their radius.
+struct PhotonLevel {
+    const PhotonPlace* places;  // bucket by bucket
+    const u32* first;     // [buckets + 1], into them
+    const u16* expected;  // [expected buckets]: photons of a pilot, which tells how many there will be
+    u32 mask, expected_mask;  // buckets - 1, a power of two less one
+    float radius;         // that photons are gathered from, metres
+    float inverse_cell;   // 1 / twice that
+    float expected_inverse_cell;
+    float scale;          // 1 / (starts * pi * radius^2)
+};
+
+// Each level's radius is twice that of the one before.
+inline constexpr u32 PHOTON_LEVELS = 6;
+
+struct PhotonMap {
+    const Photon* photons;
+    u32 count;
+    u32 enough;  // photons of the pilot, in the cells around a point, for a level to be taken there
+    PhotonLevel levels[PHOTON_LEVELS];
+};
+
+// Where photons begin: triangles whose material casts caustics, chosen by object, then by area.
+struct CastersView {
+    const u32* instances;
+    const float* instance_sums;  // [count]: shares up to and with each, the last 1
+    u32 count;
+    const u32* object_first;     // [objects + 1]: its triangles among those below
+    const u32* prims;
+    const float* prim_sums;      // as instance_sums, within an object
+    float reach;                 // beyond everything that there is, metres: where light from infinity starts
+};
+
 struct RenderView {
     SceneView view;
     CameraView camera;
@@ -44,6 +95,9 @@ struct RenderView {
     MediaView media;
     float mist_start, mist_inverse_depth, mist_exponent;
     const ShutterView* shutter;  // null: nothing moves, and no path has a time
+    bool photon_maps;         // photons bring what paths after rough surfaces find by sharp ones alone
+    CastersView casters;
+    PhotonMap photons;        // of the samples under way
 };
 
 LUCH_FN bool has_motion(const RenderView& scene) { return plan::MOTION && scene.shutter != nullptr; }

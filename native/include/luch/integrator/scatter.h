@@ -3,6 +3,7 @@
 #include "luch/bsdf/bsdf.h"
 #include "luch/geometry/surface.h"
 #include "luch/integrator/accumulate.h"
+#include "luch/integrator/caustics.h"
 #include "luch/light/sample.h"
 #include "luch/math/bounds.h"
 
@@ -72,6 +73,10 @@ LUCH_FN void add_surface_emission(const RenderView& scene, FilmWriter& writer, c
                                   const ShadePoints& points, int lane, Color emission) {
     float pdf = 0.0f;
     u32 instance = points.instance[lane];
+    if (plan::EMISSIVE_MESHES && is_caustic(path) &&
+        pdf_triangle(scene.view, path.mis_origin, path.mis_normal, true, instance, points.prim[lane],
+                     -lane_to_viewer(points, lane), points.ray_length[lane], lane_time(points, lane)) > 0.0f)
+        return;
     if (plan::EMISSIVE_MESHES && !(path.flags & PATH_NO_MIS)) {
         pdf = pdf_triangle(scene.view, path.mis_origin, path.mis_normal, path.flags & PATH_MIS_TRANSMITS, instance,
                            points.prim[lane], -lane_to_viewer(points, lane), points.ray_length[lane],
@@ -146,14 +151,23 @@ LUCH_FN bool scatter(const RenderView& scene, FilmWriter& writer, PathState& pat
         return true;
     }
     u_lobe = min_f((u_lobe - through_probability) / (1.0f - through_probability), BELOW_ONE);
-    BsdfSample s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
+    BsdfSample s;
+    float lobe_probability = 1.0f - through_probability;
+    bool sharp = false;
+    if (has_photons(scene)) {
+        ClosureSet part;
+        bool casts = casts_caustics(scene.view, points.instance[lane], points.prim[lane]);
+        lobe_probability *= choose_part(set, casts, &u_lobe, &sharp, &part);
+        s = sample_closures(part, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
+    } else {
+        s = sample_closures(set, ng, lane_to_viewer(points, lane), u_lobe, {u.x, u.y});
+    }
     if (!(s.pdf_sa > 0.0f) || is_zero(s.throughput)) return false;
     if (!finite_v(s.throughput)) {
         count_one(writer.refused + REFUSED_SCATTER);
         return false;
     }
     if (!(path.flags & PATH_PASS_CHOSEN)) choose_passes(writer.film.layout, path, s);
-    float lobe_probability = 1.0f - through_probability;
     path.throughput *= s.throughput * (1.0f / lobe_probability);
     path.mis_pdf = s.pdf_sa * lobe_probability;
     path.min_pdf = min_f(path.min_pdf, s.delta ? path.min_pdf : path.mis_pdf);
@@ -164,6 +178,7 @@ LUCH_FN bool scatter(const RenderView& scene, FilmWriter& writer, PathState& pat
     bool see_through = s.transmitted && scene.limits.film_transparent_glass && scene.limits.film_transparent &&
                        s.roughness <= sqr(scene.limits.film_transparent_roughness);
     count_bounce(path, scene.limits, s, set_transmits(set), see_through);
+    if (has_photons(scene)) note_part(path, sharp);
     if (looks_for_light_alone(path) && !scene.can_meet_light) {
         note_cut(writer, path, 1.0f);
         return false;

@@ -93,6 +93,9 @@ struct Wavefront {
     u32* ticks;         // clock cycles, [WaveClock * slots + slot]. Null: the pass is not asked for
     u32* ray_ticks;     // of rays in the closest kernel
     u32* shadow_ticks;  // of shadow rays
+    Photon* landed;     // photons of the map that is made, in no order. Null: the scene has none
+    u32* landed_count;  // of them; may come to be more than there is room for
+    u32 landed_room;
 };
 
 LUCH_FN float time_of_ray(const Wavefront& wave, u32 k) {
@@ -110,6 +113,11 @@ struct RenderTask {
 struct WaveRange {
     u32 first_pixel, pixel_count, first_sample, sample_count;
     const u32* pixels;  // no pixel twice; null: all of the film, in order
+};
+
+// Photons [first, first + count) of a map, which is told by its first sample.
+struct PhotonRange {
+    u32 map, first, count;
 };
 
 LUCH_FN PathState load_path(const Wavefront& wave, u32 slot) {

@@ -123,6 +123,21 @@ inline constexpr float FLIGHT_MARGIN = 1e-6f;
 // The largest float below 1: what a random number becomes whose rest after a choice is rounded up.
 inline constexpr float BELOW_ONE = 0.99999994f;
 
+// -- photons ---------------------------------------------------------------------------------------
+
+// The triangle that a photon starts at is met where it was sampled, but for rounding, relative to the way there: 32 EPS.
+inline constexpr float CASTER_DISTANCE_ERROR = 4e-6f;
+// From lamps that cast no shadow photons come from no further, relative to the triangle's size: nothing lies between.
+inline constexpr float SHADOWLESS_DISTANCE = 1e-3f;
+// Photons further from the tangent plane than this part of the radius, or of a surface that is turned away by more than
+// this cosine, lie on another surface.
+inline constexpr float FLAT_PART = 0.3f, SAME_SIDE_COSINE = 0.7f;
+// Where photons graze a smooth-shaded mesh, what they bring of it is bounded: by face and by smooth normals flux is
+// told apart by the quotient of two cosines, which lies near 1 elsewhere.
+inline constexpr float LEAST_PHOTON_COSINE = 0.05f, MOST_NORMAL_CORRECTION = 8.0f;
+// Of the scene's size: the finest radius of photon maps where a pilot's photons are too few to tell one.
+inline constexpr float UNTOLD_RADIUS = 5e-4f;
+
 // -- cameras ---------------------------------------------------------------------------------------
 
 // The near plane moves in, the far one out, by more than a hit's distance rounds, and the near one by more than the

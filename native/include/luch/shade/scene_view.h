@@ -71,6 +71,7 @@ struct MaterialView {
     u32 transparent_shadows;
     u32 medium;  // what fills the space behind it; NONE: nothing
     u32 only_volume;  // 1: there is no surface, only the border of its medium
+    u32 casts_caustics;  // 1: photons bring the light of its sharp lobes (integrator/caustics.h)
 };
 
 enum class PixelFormat : u8 { U8, F16, F32 };
