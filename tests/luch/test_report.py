@@ -29,6 +29,7 @@ from luch.scenefile import write_scene
 from luch.shader import ProgramBuilder
 from support.effects import closure, program
 from support.everything import everything, quad, stone
+from support.through_glass import scene_through_glass
 
 SECONDS = 200.0  # more than it takes
 CLAMP = 0.5  # of indirect light: some of it is cut
@@ -181,7 +182,19 @@ def test_what_is_not_tried_is_told_with_its_reason() -> None:
     found = plan(scene, effects_of(scene), "BVH", 100_000)
     assert not any(variant.group in ("Bounces", "Russian roulette") for variant in found.variants)
     assert any(line.startswith("Bounces") for line in found.absent)
-    assert any(line.startswith("Integrators") for line in found.absent)
+    assert any(line.startswith("Photon maps") for line in found.absent)
+    integrators = [variant for variant in found.variants if variant.group == "Integrators"]
+    assert not integrators
+
+
+def test_each_other_integrator_is_tried_where_it_can_find_light_of_its_own() -> None:
+    scene = scene_through_glass(integrator="PATH")
+    found = plan(scene, effects_of(scene), "BVH", 4)
+    (photons,) = [variant for variant in found.variants if variant.group == "Integrators"]
+    assert photons.settings == {"integrator": "PHOTON"} and photons.biased
+    scene.settings.integrator = "PHOTON"
+    (paths,) = [v for v in plan(scene, effects_of(scene), "BVH", 4).variants if v.group == "Integrators"]
+    assert paths.settings == {"integrator": "PATH"}
 
 
 # -- the whole --------------------------------------------------------------------------------

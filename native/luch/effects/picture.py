@@ -197,6 +197,7 @@ _PHOTONS = "caustics of surfaces smoother than a roughness of .32 are brought by
 def _add_photon_maps(effects: Effects, settings: Settings) -> None:
     lit = any(effects[name].on for name in (*LAMPS.values(), "emissive meshes", "world light sampling"))
     caustics = any(effects[f"{kind} caustics"].on for kind in ("reflective", "refractive"))
+    caustics = caustics and effects["indirect light"].on
     if settings.integrator != "PHOTON":
         off = "the integrator is another"
     elif effects["volumes"].on:

@@ -87,10 +87,7 @@ def plan(
     settings = scene.settings
     on = {name for name in effects if effects[name].on}
     variants: list[Variant] = []
-    absent = [
-        "Integrators: path tracing with next event estimation is the only one.",
-        "Adaptive sampling: it acts only on renders that end by an error.",
-    ]
+    absent = ["Adaptive sampling: it acts only on renders that end by an error."]
     variants.append(Variant(EXACT, "Settings", "takes nothing from the light: what the others are held against",
                             exact_settings(settings), rank=0))  # fmt: skip
     variants.append(Variant(AS_SET, "Settings", "the scene's own settings", biased=True, rank=0))
@@ -142,13 +139,14 @@ def _add_samplers(variants: list[Variant], settings: Settings) -> None:
 
 
 def _add_integrators(variants: list[Variant], absent: list[str], settings: Settings, on: set[str]) -> None:
-    if not on & {"reflective caustics", "refractive caustics"} or "volumes" in on:
+    caustics = "indirect light" in on and on & {"reflective caustics", "refractive caustics"}
+    if not caustics or "volumes" in on:
         absent.append("Photon maps: the scene has no caustics, or volumes through which no photon is followed.")
         return
     for name, kind in INTEGRATORS.items():
         if name != settings.integrator:
             variants.append(Variant(kind.title.lower(), "Integrators", kind.reason, {"integrator": name}, biased=True,
-                                    rank=1))  # fmt: skip
+                                    rank=5))  # fmt: skip
 
 
 def _add_bounces(variants: list[Variant], absent: list[str], settings: Settings, on: set[str]) -> None:
