@@ -224,6 +224,7 @@ class PyRenderer {
         d["photons_landed"] = s.counts.photons_landed;
         d["photon_maps"] = s.photon_maps;
         d["photon_radius_m"] = s.photon_radius;
+        d["photon_map_bytes"] = s.photon_map_bytes;
         d["photon_seconds"] = s.photon_seconds;
         return d;
     }

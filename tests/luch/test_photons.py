@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from luch import samplers
+from luch._native import core
 from luch.effects import effects_of
 from luch.kept import Kept
 from luch.render import render
@@ -147,6 +149,21 @@ def test_effects_say_whether_photons_are_traced_and_why() -> None:
     assert "no light can be chosen" in effects_of(dark)["photon maps"].reason
     blurred = replace(scene, settings=replace(scene.settings, filter_glossy=1.0))
     assert effects_of(blurred)["filter glossy"].reason == "photon maps need none"
+
+
+@pytest.mark.parametrize("after", [0.0, 0.002, 0.01, 0.03, 0.06])
+def test_a_cancel_is_heard_while_photons_are_traced_and_sorted(after: float) -> None:
+    """Whatever it breaks off, the film holds whole samples."""
+    scene = scene_through_glass(samples=4096, threads=2)
+    renderer = core.render.Renderer(scene)
+    assert renderer.prepare()
+    timer = threading.Timer(after, renderer.cancel)
+    timer.start()
+    try:
+        assert not renderer.render(0, 4096)
+    finally:
+        timer.join()
+    assert np.isfinite(renderer.passes()["Combined"]).all()
 
 
 def test_an_unknown_integrator_is_told() -> None:

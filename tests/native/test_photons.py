@@ -69,6 +69,7 @@ def test_the_picture_is_the_cpus(place: str) -> None:
     assert cpu["Transmission Indirect"].max() > 0.0 == cpu["Transmission Direct"].max()  # seen through the sheet
     assert stats["photons"] == cpu_stats["photons"] and stats["photon_maps"] == cpu_stats["photon_maps"] == 3
     assert stats["photons_landed"] == pytest.approx(cpu_stats["photons_landed"], rel=1e-3)
+    assert stats["photon_map_bytes"] > 64 * 1000 < cpu_stats["photon_map_bytes"]
     assert stats["kernel_plan"]["PHOTONS"] and stats["kernels"] == "the scene's own"
 
 

@@ -24,7 +24,6 @@ class PhotonPilot {
     void build(const std::vector<Photon>& photons, u64 pixels, float reach);
     // The map whose first sample that is, of so many starts and photons, but for the arrays that hold these.
     PhotonMap map(u32 sample, u32 starts, u64 photons) const;
-    float finest_radius() const { return radius_; }
     const std::vector<u16>& expected(u32 level) const { return expected_[level]; }
 
  private:

@@ -344,6 +344,7 @@ void Renderer::find_casters() {
     if (!input_.photon_maps || scene_.has_media || !scene_.has_lights) return;
     scene_.casters_store.build(scene_.view, store_->materials(), scene_.max_registers, pool_);
     scene_.casters = scene_.casters_store.view();
+    stats_.scene_bytes += scene_.casters_store.bytes();
     scene_.photon_maps = scene_.casters.count > 0;
 }
 
@@ -375,6 +376,7 @@ bool Renderer::make_photon_map(u32 sample) {
     const u64 pixels = u64(film_->view().width) * film_->view().height;
     const u32 starts = starts_for(pixels);
     std::vector<Photon> landed;
+    map_sample_ = NONE;
     if (!has_pilot_) {
         if (!trace_map(PILOT_MAP, pilot_starts_for(pixels), &landed)) return false;
         scene_.photon_pilot.build(landed, pixels, scene_.casters.reach);
@@ -384,11 +386,16 @@ bool Renderer::make_photon_map(u32 sample) {
     const u32 all = starts * samples_of_map(map, MOST_SAMPLES_OF_MAP);
     if (!trace_map(map, all, &landed)) return false;
     const PhotonMap described = scene_.photon_pilot.map(map, all, landed.size());
-    scene_.photon_store.build(described, std::move(landed), pool_);
+    try {
+        scene_.photon_store.build(described, std::move(landed), pool_);
+    } catch (const Cancelled&) {
+        return false;
+    }
     scene_.photons = scene_.photon_store.view();
     map_sample_ = map;
     stats_.photon_maps++;
     stats_.photon_radius = scene_.photons.levels[0].radius;
+    stats_.photon_map_bytes = scene_.photon_store.bytes();
     stats_.photon_seconds += seconds_now() - start;
     return true;
 }

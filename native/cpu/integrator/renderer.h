@@ -83,7 +83,8 @@ struct RenderStats {
     u32 accel_builds = 0;  // for this picture: 0 where another's structures served
     double accel_seconds = 0.0, lights_seconds = 0.0, trace_seconds = 0.0, photon_seconds = 0.0;
     u64 photon_maps = 0;
-    float photon_radius = 0.0f;  // of the last map's finest level, metres
+    u64 photon_map_bytes = 0;    // of the last map
+    float photon_radius = 0.0f;  // of its finest level, metres
     u64 scene_bytes = 0;
     u64 local_tree_bytes = 0;  // trees of what scatters under its surface
     u64 film_pixel_bytes = 0;  // what the film keeps of one pixel

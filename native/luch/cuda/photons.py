@@ -48,7 +48,7 @@ class PhotonMaps:
         self._expected: list[Any] = []
         self._held: list[Any] = []  # arrays of the map
         self.stats = {"photons": 0, "photons_landed": 0, "photon_maps": 0, "photon_radius_m": 0.0,
-                      "photon_seconds": 0.0}  # fmt: skip
+                      "photon_map_bytes": 0, "photon_seconds": 0.0}  # fmt: skip
 
     def serve(self, sample: int) -> bool:
         """Makes the map that serves a sample, unless it is at hand. False when cancelled."""
@@ -154,11 +154,7 @@ class PhotonMaps:
             if number == 0:
                 self.stats["photon_radius_m"] = struct.unpack("<f", radius)[0]
         self._memory.place("scene.photons", bytes(view))
-
-    @property
-    def held_bytes(self) -> int:
-        """Of the map at hand, on the device."""
-        return sum(int(array.nbytes) for array in [*self._held, *self._expected])
+        self.stats["photon_map_bytes"] = sum(int(array.nbytes) for array in self._held)
 
     def _launch(self, kernel: Any, turn: int, threads: int, *more: bytes) -> None:
         kernel.launch(-(-threads // BLOCK), BLOCK, [self._memory.tasks[turn], *more])

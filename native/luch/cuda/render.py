@@ -479,10 +479,6 @@ class DeviceRenderer(HostFilm):
         """Counts, bytes and seconds, under the names of the CPU's."""
         return {**self._host.core.stats(), **self.own_stats()}
 
-    def _photon_stats(self) -> dict[str, Any]:
-        maps = self._photons
-        return {} if maps is None else {**maps.stats, "photon_map_bytes": maps.held_bytes}
-
     def _shading_kernel(self) -> dict[str, float]:
         """What the dearest stage takes of a multiprocessor."""
         told = self._stages.kernel("shade_surfaces").properties(BLOCK)
@@ -502,7 +498,7 @@ class DeviceRenderer(HostFilm):
         counts["shadow_rays"] += counts.pop("transparent_rays")
         return (
             counts
-            | self._photon_stats()
+            | ({} if self._photons is None else self._photons.stats)
             | {
                 "trace_seconds": self._trace_seconds,
                 "upload_seconds": self._upload_seconds,
