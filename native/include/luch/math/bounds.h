@@ -125,7 +125,7 @@ inline constexpr float BELOW_ONE = 0.99999994f;
 
 // -- photons ---------------------------------------------------------------------------------------
 
-// The triangle that a photon starts at is met where it was sampled, but for rounding, relative to the way there: 32 EPS.
+// The triangle that a photon starts at is met where it was sampled, but for rounding, relative to the way there: 67 EPS.
 inline constexpr float CASTER_DISTANCE_ERROR = 4e-6f;
 // From lamps that cast no shadow photons come from no further, relative to the triangle's size: nothing lies between.
 inline constexpr float SHADOWLESS_DISTANCE = 1e-3f;
