@@ -15,6 +15,7 @@ void bind_light(py::module_& m);
 void bind_math(py::module_& m);
 void bind_media(py::module_& m);
 void bind_motion(py::module_& m);
+void bind_photons(py::module_& m);
 void bind_render(py::module_& m);
 void bind_sampling(py::module_& m);
 void bind_scene_trees(py::module_& m);

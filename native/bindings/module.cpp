@@ -11,6 +11,7 @@ PYBIND11_MODULE(LUCH_MODULE_NAME, m) {
     luch::bindings::bind_math(m);
     luch::bindings::bind_media(m);
     luch::bindings::bind_motion(m);
+    luch::bindings::bind_photons(m);
     luch::bindings::bind_render(m);
     luch::bindings::bind_sampling(m);
     luch::bindings::bind_shade(m);

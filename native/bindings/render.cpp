@@ -13,7 +13,6 @@
 #include "bindings/scene_reader.h"
 #include "bindings/scene_trees.h"
 #include "luch/integrator/borders.h"
-#include "luch/integrator/photon_map.h"
 #include "luch/integrator/subsurface.h"
 
 namespace luch::bindings {
@@ -310,73 +309,8 @@ py::dict image_layout() {
 
 }  // namespace
 
-// PhotonPilot, for photons that a device has traced.
-class PyPhotonPilot {
- public:
-    PyPhotonPilot(const py::array_t<u8, py::array::c_style>& photons, u64 pixels, float reach) {
-        if (size_t(photons.size()) % sizeof(Photon) != 0) throw py::value_error("photons: whole records are needed");
-        std::vector<Photon> read(size_t(photons.size()) / sizeof(Photon));
-        if (!read.empty()) std::memcpy(static_cast<void*>(read.data()), photons.data(), size_t(photons.size()));
-        pilot_.build(read, pixels, reach);
-    }
-    // luch::PhotonMap, without pointers.
-    py::bytes map(u32 sample, u32 starts, u64 photons) const {
-        PhotonMap map = pilot_.map(sample, starts, photons);
-        for (PhotonLevel& level : map.levels) level.expected = nullptr;
-        char bytes[sizeof(map)];
-        std::memcpy(bytes, &map, sizeof(map));
-        return py::bytes(bytes, sizeof(bytes));
-    }
-    // uint16, level by level.
-    py::list expected() const {
-        py::list levels;
-        for (u32 l = 0; l < PHOTON_LEVELS; ++l)
-            levels.append(py::array_t<u16>(py::ssize_t(pilot_.expected(l).size()), pilot_.expected(l).data()));
-        return levels;
-    }
-
- private:
-    cpu::PhotonPilot pilot_;
-};
-
-// Where luch/cuda/photons.py finds what it sets in a luch::PhotonMap, and what it needs to know of its levels.
-py::dict photon_map_layout() {
-    py::dict layout;
-    layout["size"] = sizeof(PhotonMap);
-    layout["photons"] = offsetof(PhotonMap, photons);
-    layout["levels"] = offsetof(PhotonMap, levels);
-    layout["level_size"] = sizeof(PhotonLevel);
-    layout["places"] = offsetof(PhotonLevel, places);
-    layout["first"] = offsetof(PhotonLevel, first);
-    layout["expected"] = offsetof(PhotonLevel, expected);
-    layout["mask"] = offsetof(PhotonLevel, mask);
-    layout["radius"] = offsetof(PhotonLevel, radius);
-    layout["inverse_cell"] = offsetof(PhotonLevel, inverse_cell);
-    layout["level_count"] = PHOTON_LEVELS;
-    layout["pilot_map"] = PILOT_MAP;
-    return layout;
-}
-
-void bind_photons(py::module_& render) {
-    py::class_<PyPhotonPilot>(render, "PhotonPilot")
-        .def(py::init<const py::array_t<u8, py::array::c_style>&, u64, float>(), py::arg("photons"), py::arg("pixels"),
-             py::arg("reach"),
-             "photons: uint8, records of luch::Photon in their order, of pilot_starts(pixels) starts; reach: metres.")
-        .def("map", &PyPhotonPilot::map, py::arg("sample"), py::arg("starts"), py::arg("photons"))
-        .def("expected", &PyPhotonPilot::expected);
-    render.def("photon_map_layout", &photon_map_layout);
-    render.def("photon_starts", &cpu::starts_for, py::arg("pixels"),
-               "Photons that start for each sample of all pixels.");
-    render.def("pilot_starts", &cpu::pilot_starts_for, py::arg("pixels"), "And before the first.");
-    render.def("first_of_map", &first_of_map, py::arg("sample"), "The first sample of the map that serves this one.");
-    render.def("samples_of_map", &samples_of_map, py::arg("sample"), py::arg("count"),
-               "How many samples from this one on, at most count, the same map serves.");
-    render.attr("MOST_SAMPLES_OF_MAP") = MOST_SAMPLES_OF_MAP;
-}
-
 void bind_render(py::module_& m) {
     auto render = m.def_submodule("render", "Rendering of a luch.scene.Scene on the CPU.");
-    bind_photons(render);
     render.def("task_fields", &task_fields);
     render.def("task_sizes", &task_sizes);
     render.def("forcible_effects", &forcible_effects);

@@ -121,10 +121,9 @@ def _next_count(done: int, next_look: int, seconds: float) -> int:
 
 
 def _adaptive_for(film: Film, settings: Settings) -> Adaptive | None:
-    """Only on the way to an error; merged pictures must have the same samples everywhere."""
-    if not (settings.adaptive and settings.error_limit > 0.0) or settings.mergeable or settings.integrator == "PHOTON":
-        return None
-    return Adaptive(film, settings.samples)
+    """Only on the way to an error, and where not every pixel must have the same samples."""
+    asked = settings.adaptive and settings.error_limit > 0.0
+    return Adaptive(film, settings.samples) if asked and not _not_adaptive(settings) else None
 
 
 def _not_adaptive(settings: Settings) -> list[str]:
@@ -132,9 +131,9 @@ def _not_adaptive(settings: Settings) -> list[str]:
         return []
     if settings.integrator == "PHOTON":
         return ["Adaptive Sampling is left out: with photon maps a sample of all pixels shares its photons."]
-    if not settings.mergeable:
-        return []
-    return ["Adaptive Sampling is left out: pictures that are merged or verified have the same samples everywhere."]
+    if settings.mergeable:
+        return ["Adaptive Sampling is left out: pictures that are merged or verified have the same samples everywhere."]
+    return []
 
 
 def _renderer_for(scene: Scene) -> tuple[Any, list[str]]:

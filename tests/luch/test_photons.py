@@ -14,9 +14,11 @@ from luch._native import core
 from luch.effects import effects_of
 from luch.kept import Kept
 from luch.render import render
-from luch.scene import Instances, Light, Material, Object, Scene
+from luch.scene import Light, Material, Scene
 from support.effects import closure, program
-from support.through_glass import ALBEDO, SUN, glass, grey, radiance_seen, scene_through_glass, square
+from support.everything import quad
+from support.hard_scenes import instances_of
+from support.through_glass import ALBEDO, SUN, glass, grey, objects_of, radiance_seen, scene_through_glass
 
 
 def picture(scene: Scene) -> Any:
@@ -48,10 +50,11 @@ def wide_sun(scene: Scene) -> None:
 def shining_mesh(scene: Scene) -> None:
     """A square that shines downwards, beside the camera's view."""
     scene.lights = []
-    scene.meshes.append(square("Panel", 0.5, 1.0))
+    scene.meshes.append(quad("Panel", 0.5, 1.0))
     scene.meshes[2].positions[:, 0] += 1.2
     scene.meshes[2].triangles = scene.meshes[2].triangles[:, ::-1].copy()
-    _place(scene)
+    scene.objects = objects_of(scene.meshes)
+    scene.instances = instances_of(range(3), [np.eye(3, 4)] * 3)
     scene.materials.append(
         Material(
             "Light",
@@ -59,16 +62,6 @@ def shining_mesh(scene: Scene) -> None:
             emission_sampling="FRONT_BACK",
         )
     )
-
-
-def _place(scene: Scene) -> None:
-    """One instance of every mesh."""
-    count = len(scene.meshes)
-    scene.objects = [Object(mesh.name, number, [number]) for number, mesh in enumerate(scene.meshes)]
-    scene.instances = Instances(
-        np.arange(count, dtype=np.uint32), np.repeat(np.eye(3, 4)[None], count, axis=0), np.zeros(count, np.float32),
-        np.zeros((count, 3), np.float32), np.zeros((count, 2), np.float32),
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("light", [lamp("AREA"), lamp("POINT"), lamp("SPOT"), wide_sun, shining_mesh],

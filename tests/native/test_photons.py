@@ -50,11 +50,11 @@ def test_a_scene_without_caustics_is_drawn_by_paths_bit_for_bit() -> None:
 def test_maps_part_where_the_film_does_and_serve_every_sample_once() -> None:
     sample, firsts = 0, []
     while sample < 200:
-        count = core.render.samples_of_map(sample, 1 << 20)
+        count = core.photons.samples_of_map(sample, 1 << 20)
         firsts.append(sample)
-        assert 0 < count <= core.render.MOST_SAMPLES_OF_MAP
-        assert {core.render.first_of_map(sample + k) for k in range(count)} == {sample}
-        assert core.render.samples_of_map(sample + count - 1, 100) == 1
+        assert 0 < count <= core.photons.MOST_SAMPLES_OF_MAP
+        assert {core.photons.first_of_map(sample + k) for k in range(count)} == {sample}
+        assert core.photons.samples_of_map(sample + count - 1, 100) == 1
         sample += count
     assert {1 << k for k in range(8)} <= set(firsts)
 

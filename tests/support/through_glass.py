@@ -7,21 +7,19 @@ no path that leaves the floor meets it.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from luch.scene import Camera, Film, Instances, Light, Material, Mesh, Object, Scene, Settings
+from luch.scene import Camera, Film, Light, Material, Mesh, Object, Scene, Settings
 from luch.shader import ProgramBuilder
 
 from support.effects import closure, program
+from support.everything import quad
+from support.hard_scenes import instances_of
 
 IOR, ALBEDO, SUN = 1.5, 0.5, math.pi  # W/m2
 HALF = 2.0  # metres, of floor and sheet
-
-
-def square(name: str, half: float, height: float) -> Mesh:
-    corners = np.array([[-half, -half, height], [half, -half, height], [half, half, height], [-half, half, height]])
-    return Mesh(name, corners.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.uint32), np.zeros(2, np.uint16))
 
 
 def glass(builder: ProgramBuilder, roughness: float = 0.0) -> None:
@@ -32,18 +30,20 @@ def grey(builder: ProgramBuilder) -> None:
     closure(builder, "CLOSURE_DIFFUSE", {"color": (ALBEDO,) * 3})
 
 
+def objects_of(meshes: Sequence[Mesh]) -> list[Object]:
+    """Each mesh with the material of its own number."""
+    return [Object(mesh.name, number, [number]) for number, mesh in enumerate(meshes)]
+
+
 def scene_through_glass(samples: int = 64, size: int = 8, **settings: Any) -> Scene:
     """Seen from above by an orthographic camera, a square of 1 m in the middle of 4 m."""
-    meshes = [square("Floor", HALF, 0.0), square("Sheet", HALF, 0.02)]
+    meshes = [quad("Floor", HALF, 0.0), quad("Sheet", HALF, 0.02)]
     eye = np.eye(3, 4)
     eye[2, 3] = 5.0
     return Scene(
         meshes=meshes,
-        objects=[Object(mesh.name, number, [number]) for number, mesh in enumerate(meshes)],
-        instances=Instances(
-            np.arange(2, dtype=np.uint32), np.repeat(np.eye(3, 4)[None], 2, axis=0), np.zeros(2, np.float32),
-            np.zeros((2, 3), np.float32), np.zeros((2, 2), np.float32),
-        ),
+        objects=objects_of(meshes),
+        instances=instances_of(range(len(meshes)), [np.eye(3, 4)] * len(meshes)),
         materials=[Material("Grey", program(grey)), Material("Glass", program(glass))],
         lights=[Light("Sun", "SUN", power=SUN)],
         camera=Camera(kind="ORTHO", ortho_scale=1.0, clip_start=0.01, clip_end=100.0, matrix=eye),

@@ -1,7 +1,7 @@
 #include "cpu/accel/choice.h"
+#include "cpu/seconds.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <stdexcept>
 
@@ -37,11 +37,6 @@ constexpr double TRIAL_SHARE = 0.01;         // of the expected tracing, for the
 constexpr u32 TRIAL_RAYS = 2048;
 // A challenger must win by this much: trials scatter by a few percent.
 constexpr double CLEAR_WIN = 1.1;
-
-double seconds_now() {
-    using namespace std::chrono;
-    return duration<double>(steady_clock::now().time_since_epoch()).count();
-}
 
 Vec3 point_on_scene(const SceneView& scene, u32 number) {
     const InstanceView& instance = scene.instances[hash_u32(number, 0) % scene.instance_count];

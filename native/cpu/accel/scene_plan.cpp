@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "cpu/accel/world_box.h"
+
 namespace luch::cpu {
 namespace {
 
@@ -26,13 +28,6 @@ bool is_finite(const Affine& a) {
     return std::all_of(std::begin(a.m), std::end(a.m), [](float x) { return finite_f(x); });
 }
 
-Box world_box(const Affine& to_world, const Box& box) {
-    Box out = empty_box();
-    for (int corner = 0; corner < 8; ++corner)
-        extend(out, transform_point(to_world, {corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y,
-                                               corner & 4 ? box.hi.z : box.lo.z}));
-    return out;
-}
 float size_of(const Box& box) { return max_f(max_component(abs_v(box.lo)), max_component(abs_v(box.hi))); }
 
 // A box that overflowed, or nearly so, becomes everything that builders can take.

@@ -98,12 +98,16 @@ void Batch::trace(const PixelBlock& block) {
         shade_hits();
         if (walk_count_ > 0) walk_subsurface();
         trace_shadows();
-        std::swap(rays_, next_rays_);
-        std::swap(ray_path_, next_path_);
-        std::swap(ray_time_, next_time_);
-        ray_count_ = next_count_;
+        next_generation();
     }
     if (stops()) undo(block.sample_count);
+}
+
+void Batch::next_generation() {
+    std::swap(rays_, next_rays_);
+    std::swap(ray_path_, next_path_);
+    std::swap(ray_time_, next_time_);
+    ray_count_ = next_count_;
 }
 
 void Batch::keep_pixel(u32 pixel) {

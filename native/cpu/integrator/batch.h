@@ -65,6 +65,7 @@ class Batch {
  private:
     // batch.cpp: the wavefront
     bool stops() const { return stop_.load(std::memory_order_relaxed); }
+    void next_generation();
     void keep_pixel(u32 pixel);
     void undo(u32 sample_count);
     void generate(const PixelBlock& block);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <memory>
 
+#include "cpu/accel/world_box.h"
+#include "cpu/light/cdf.h"
 #include "cpu/shade/interpreter.h"
 #include "luch/integrator/caustics.h"
 
@@ -81,16 +83,6 @@ float sharp_share(const SceneView& scene, const MaterialView& material, const st
     return looks.empty() ? 0.0f : float(sum / double(looks.size()));
 }
 
-// sums[from, ...): each entry's share with all before it; the last is 1.
-void running_shares(std::vector<float>& sums, size_t from, const std::vector<double>& weights) {
-    double total = 0.0, running = 0.0;
-    for (double weight : weights) total += weight;
-    for (size_t i = 0; i < weights.size(); i++) {
-        running += weights[i];
-        sums[from + i] = i + 1 == weights.size() ? 1.0f : float(running / total);
-    }
-}
-
 // How much larger areas become, about.
 double area_scale(const Affine& m) {
     const Vec3 x = transform_direction(m, {1, 0, 0}), y = transform_direction(m, {0, 1, 0});
@@ -100,27 +92,20 @@ double area_scale(const Affine& m) {
 
 // Diagonal of the box around all triangles, metres.
 float size_of(const SceneView& scene) {
-    struct Box {
-        Vec3 low = make_vec3(INFINITE_DISTANCE), high = make_vec3(-INFINITE_DISTANCE);
-        void add(Vec3 p) {
-            if (finite_v(p)) low = min_v(low, p), high = max_v(high, p);
-        }
-    };
-    std::vector<Box> boxes(scene.mesh_count);
+    std::vector<Box> boxes(scene.mesh_count, empty_box());
     for (u32 m = 0; m < scene.mesh_count; m++) {
         for (u32 prim = 0; prim < scene.meshes[m].triangle_count; prim++)
-            for (const Vec3& corner : triangle_at(scene, scene.meshes[m], prim).p) boxes[m].add(corner);
+            for (const Vec3& corner : triangle_at(scene, scene.meshes[m], prim).p)
+                if (finite_v(corner)) extend(boxes[m], corner);
     }
-    Box all;
+    Box all = empty_box();
     for (u32 i = 0; i < scene.instance_count; i++) {
-        const Box& box = boxes[scene.instances[i].mesh];
-        if (!(box.low.x <= box.high.x)) continue;
-        for (int corner = 0; corner < 8; corner++)
-            all.add(transform_point(scene.instances[i].to_world,
-                                    {corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
-                                     corner & 4 ? box.high.z : box.low.z}));
+        const Box& own = boxes[scene.instances[i].mesh];
+        if (!(own.lo.x <= own.hi.x)) continue;  // it has none
+        const Box box = world_box(scene.instances[i].to_world, own);
+        if (finite_v(box.lo) && finite_v(box.hi)) extend(all, box);
     }
-    return length(all.high - all.low);
+    return length(all.hi - all.lo);
 }
 
 double area_of(const SceneView& scene, const InstanceView& at, u32 prim) {
@@ -147,11 +132,11 @@ void CasterStore::build(const SceneView& scene, MaterialView* materials, size_t 
     list_instances(scene, object_weights);
     float reach = 2.0f * size_of(scene);
     view_ = {instances_.data(),
-             instance_sums_.data(),
+             instance_cdf_.data(),
              u32(instances_.size()),
              object_first_.data(),
              prims_.data(),
-             prim_sums_.data(),
+             prim_cdf_.data(),
              finite_f(reach) && reach > 0.0f ? reach : 1.0f};
 }
 
@@ -161,7 +146,6 @@ std::vector<double> CasterStore::list_triangles(const SceneView& scene, const st
     std::vector<double> object_weights(scene.object_count);
     object_first_.assign(scene.object_count + 1, 0);
     for (u32 object = 0; object < scene.object_count; object++) {
-        const size_t from = prims_.size();
         std::vector<double> weights;
         for_each_triangle(scene, {examples[object]}, [&](u32 i, u32 prim, u32 m) {
             const double weight = double(shares[m]) * area_of(scene, scene.instances[i], prim);
@@ -170,8 +154,9 @@ std::vector<double> CasterStore::list_triangles(const SceneView& scene, const st
             prims_.push_back(prim);
             object_weights[object] += weight;
         });
-        prim_sums_.resize(prims_.size());
-        running_shares(prim_sums_, from, weights);
+        const size_t from = prim_cdf_.size();
+        prim_cdf_.resize(from + weights.size() + 1);
+        fill_cdf(weights, &prim_cdf_[from]);
         object_first_[object + 1] = u32(prims_.size());
     }
     return object_weights;
@@ -185,20 +170,20 @@ void CasterStore::list_instances(const SceneView& scene, const std::vector<doubl
         instances_.push_back(i);
         weights.push_back(object_weights[at.object] * area_scale(at.to_world));
     }
-    instance_sums_.resize(instances_.size());
-    running_shares(instance_sums_, 0, weights);
+    instance_cdf_.resize(weights.size() + 1);
+    fill_cdf(weights, instance_cdf_.data());
 }
 
 void CasterStore::describe(DeviceImage& image, u32 block, const CastersView& view) const {
     image.add_array("casters", block, view.instances, instances_.size());
-    image.add_array("caster shares", block, view.instance_sums, instance_sums_.size());
+    image.add_array("caster shares", block, view.instance_cdf, instance_cdf_.size());
     image.add_array("casters of objects", block, view.object_first, object_first_.size());
     image.add_array("caster triangles", block, view.prims, prims_.size());
-    image.add_array("caster triangle shares", block, view.prim_sums, prim_sums_.size());
+    image.add_array("caster triangle shares", block, view.prim_cdf, prim_cdf_.size());
 }
 
 size_t CasterStore::bytes() const {
-    return 4 * (instances_.size() + object_first_.size() + prims_.size() + instance_sums_.size() + prim_sums_.size());
+    return 4 * (instances_.size() + object_first_.size() + prims_.size() + instance_cdf_.size() + prim_cdf_.size());
 }
 
 }  // namespace luch::cpu

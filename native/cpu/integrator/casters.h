@@ -24,7 +24,7 @@ class CasterStore {
     void list_instances(const SceneView& scene, const std::vector<double>& object_weights);
 
     std::vector<u32> instances_, object_first_, prims_;
-    std::vector<float> instance_sums_, prim_sums_;
+    std::vector<float> instance_cdf_, prim_cdf_;
     CastersView view_{};
 };
 

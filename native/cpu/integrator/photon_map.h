@@ -22,6 +22,7 @@ class PhotonPilot {
  public:
     // photons: of a pilot for a picture of so many pixels; reach: the scene's size, metres, for too few to tell.
     void build(const std::vector<Photon>& photons, u64 pixels, float reach);
+    bool has_looked() const { return radius_ > 0.0f; }
     // The map whose first sample that is, of so many starts and photons, but for the arrays that hold these.
     PhotonMap map(u32 sample, u32 starts, u64 photons) const;
     const std::vector<u16>& expected(u32 level) const { return expected_[level]; }

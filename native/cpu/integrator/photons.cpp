@@ -39,10 +39,7 @@ void Batch::trace_photons(u32 map, u32 first, u32 count, std::vector<Photon>* la
                 shade_photons(m, sorted_.data() + i, int(std::min(u32(SHADE_LANES), end - i)), landed);
             begin = end;
         }
-        std::swap(rays_, next_rays_);
-        std::swap(ray_path_, next_path_);
-        std::swap(ray_time_, next_time_);
-        ray_count_ = next_count_;
+        next_generation();
     }
     ray_count_ = 0;
 }
@@ -63,9 +60,7 @@ void Batch::shade_photons(u32 material, const u32* queue, int count, std::vector
             landed->push_back(photon);
             counts_.photons_landed++;
         }
-        if (!goes_on) continue;
-        if (!next_time_.empty()) next_time_[next_count_] = lane_time(points, lane);
-        next_count_++;
+        if (goes_on) send_next(points, lane);
     }
 }
 

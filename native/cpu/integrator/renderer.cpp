@@ -1,13 +1,13 @@
 #include "cpu/integrator/renderer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <stdexcept>
 
 #include "cpu/accel/scene_plan.h"
+#include "cpu/seconds.h"
 #include "cpu/shade/interpreter.h"
 #include "cpu/sky/world_sun.h"
-#include "luch/integrator/photon.h"
+#include "luch/integrator/photon_map.h"
 #include "luch/shade/surface_setup.h"
 
 namespace luch::cpu {
@@ -16,11 +16,6 @@ namespace {
 constexpr u32 SAMPLES_PER_BATCH = BATCH_PATHS / (TILE_SIZE * TILE_SIZE);
 // Rays of a path, shadow rays among them. Interiors cast 8 to 12; a low guess only leaves out a trial.
 constexpr double EXPECTED_RAYS = 4.0;
-
-double seconds_now() {
-    using namespace std::chrono;
-    return duration<double>(steady_clock::now().time_since_epoch()).count();
-}
 
 // One lane, evaluated for its emission.
 Color evaluate_emission(const SceneView& view, const Program& program, const ShadePoints& points) {
@@ -316,16 +311,14 @@ bool Renderer::trace_tiles(int halves, const SamplesOf& samples_of) {
 
 bool Renderer::render(u32 first, u32 count) {
     const u32 end = first + count;
-    u64 maps = 1;
-    for (u32 s = first; scene_.photon_maps && s + samples_of_map(s, end - s) < end; s += samples_of_map(s, end - s))
-        maps++;
-    tiles_total_ = tile_count() * maps;
+    auto at_once = [&](u32 from) { return scene_.photon_maps ? samples_of_map(from, end - from) : end - from; };
+    u64 pieces = 0;
+    for (u32 from = first; from < end; from += at_once(from)) pieces++;
+    tiles_total_ = tile_count() * pieces;
     tiles_done_.store(0);
-    while (first < end) {
-        const u32 samples = scene_.photon_maps ? samples_of_map(first, end - first) : end - first;
-        if (scene_.photon_maps && !make_photon_map(first)) return false;
-        if (!trace_tiles(1, [&](size_t) { return Samples{first, samples}; })) return false;
-        first += samples;
+    for (u32 from = first; from < end; from += at_once(from)) {
+        if (scene_.photon_maps && !make_photon_map(from)) return false;
+        if (!trace_tiles(1, [&](size_t) { return Samples{from, at_once(from)}; })) return false;
     }
     return !cancelled_.load();
 }
@@ -337,67 +330,6 @@ bool Renderer::render_regions(const std::vector<u32>& begins, const std::vector<
     tiles_total_ = tile_count() * 2;
     tiles_done_.store(0);
     return trace_tiles(2, [&](size_t i) { return Samples{begins[i], ends[i] > begins[i] ? ends[i] - begins[i] : 0u}; });
-}
-
-// Volumes scatter photons on their way, which nobody follows there: scenes with them stay with paths.
-void Renderer::find_casters() {
-    if (!input_.photon_maps || scene_.has_media || !scene_.has_lights) return;
-    scene_.casters_store.build(scene_.view, store_->materials(), scene_.max_registers, pool_);
-    scene_.casters = scene_.casters_store.view();
-    stats_.scene_bytes += scene_.casters_store.bytes();
-    scene_.photon_maps = scene_.casters.count > 0;
-}
-
-// The photons of so many starts, in their order; false when cancelled.
-bool Renderer::trace_map(u32 map, u32 starts, std::vector<Photon>* landed) {
-    const size_t pieces = (starts + BATCH_PATHS - 1) / BATCH_PATHS;
-    std::vector<std::vector<Photon>> of_pieces(pieces);
-    try {
-        pool_.parallel_for(pieces, 1, [&](size_t begin, size_t end, unsigned worker) {
-            for (size_t i = begin; i < end && !cancelled_.load(std::memory_order_relaxed); i++) {
-                const u32 first = u32(i) * u32(BATCH_PATHS);
-                batches_[worker]->trace_photons(map, first, std::min(u32(BATCH_PATHS), starts - first), &of_pieces[i]);
-                std::sort(of_pieces[i].begin(), of_pieces[i].end(),
-                          [](const Photon& a, const Photon& b) { return photon_order(a) < photon_order(b); });
-            }
-        });
-    } catch (const Cancelled&) {
-        return false;
-    }
-    for (const std::vector<Photon>& piece : of_pieces) landed->insert(landed->end(), piece.begin(), piece.end());
-    return !cancelled_.load();
-}
-
-// The map that serves a sample, unless it is at hand. False when cancelled.
-bool Renderer::make_photon_map(u32 sample) {
-    const u32 map = first_of_map(sample);
-    if (map == map_sample_) return true;
-    const double start = seconds_now();
-    const u64 pixels = u64(film_->view().width) * film_->view().height;
-    const u32 starts = starts_for(pixels);
-    std::vector<Photon> landed;
-    map_sample_ = NONE;
-    if (!has_pilot_) {
-        if (!trace_map(PILOT_MAP, pilot_starts_for(pixels), &landed)) return false;
-        scene_.photon_pilot.build(landed, pixels, scene_.casters.reach);
-        has_pilot_ = true;
-        landed.clear();
-    }
-    const u32 all = starts * samples_of_map(map, MOST_SAMPLES_OF_MAP);
-    if (!trace_map(map, all, &landed)) return false;
-    const PhotonMap described = scene_.photon_pilot.map(map, all, landed.size());
-    try {
-        scene_.photon_store.build(described, std::move(landed), pool_);
-    } catch (const Cancelled&) {
-        return false;
-    }
-    scene_.photons = scene_.photon_store.view();
-    map_sample_ = map;
-    stats_.photon_maps++;
-    stats_.photon_radius = scene_.photons.levels[0].radius;
-    stats_.photon_map_bytes = scene_.photon_store.bytes();
-    stats_.photon_seconds += seconds_now() - start;
-    return true;
 }
 
 double Renderer::step_progress() const { return double(tiles_done_.load()) / double(std::max<u64>(tiles_total_, 1)); }

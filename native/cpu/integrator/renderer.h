@@ -166,8 +166,10 @@ class Renderer {
     void make_batches();
     void find_constants();
     void build_lights();
+    // render_photons.cpp
     void find_casters();
-    bool trace_map(u32 map, u32 starts, std::vector<Photon>* landed);
+    std::vector<Photon> trace_photons(u32 map, u32 starts);
+    void build_photon_map(u32 map);
     bool make_photon_map(u32 sample);
     void mark_in_world();
     WorldSun find_sun(WorldInput& world);  // and tells the world of it
@@ -188,7 +190,6 @@ class Renderer {
     std::atomic<bool> cancelled_{false};
     std::atomic<u64> tiles_done_{0};
     u64 tiles_total_ = 1;
-    bool has_pilot_ = false;     // of photons
     u32 map_sample_ = NONE;      // the first of those that the photons at hand serve
     RenderStats stats_;
 };

@@ -80,12 +80,8 @@ void Batch::setup_chunk(const u32* queue, int count, ShadePoints& points) {
     points.count = count;
     for (int lane = 0; lane < count; lane++) {
         u32 k = queue[lane];
-        SurfacePoint& spawn = scratch_->spawn[lane];
-        spawn = surface_point(scene_.view, hits_[k], rays_[k], time_of(k));
-        setup_surface_lane(
-            scene_.view,
-            surface_inputs(paths_[ray_path_[k]], ray_path_[k], hits_[k], spawn, rays_[k].direction, time_of(k)), points,
-            lane);
+        scratch_->spawn[lane] =
+            setup_hit_lane(scene_, paths_[ray_path_[k]], ray_path_[k], hits_[k], rays_[k], time_of(k), points, lane);
     }
 }
 

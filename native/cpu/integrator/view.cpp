@@ -120,7 +120,7 @@ void Renderer::set_view(const ViewInput& view) {
     look();
     if (world_reads_camera_) build_lights();
     place_media();
-    map_sample_ = NONE, has_pilot_ = false;
+    map_sample_ = NONE, scene_.photon_pilot = {};
     make_batches();
 }
 

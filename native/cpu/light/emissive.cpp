@@ -3,10 +3,12 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 
 #include "cpu/light/build.h"
+#include "cpu/light/cdf.h"
 #include "luch/light/triangle.h"
 
 namespace luch::cpu {
@@ -199,12 +201,12 @@ class Collector {
         const MeshView& mesh = scene_.meshes[at.mesh];
         Cluster& c = found->second;
         c = {static_cast<u32>(out_.cluster_cdf.size()), 0.0f, make_vec3(1e38f), make_vec3(-1e38f)};
-        std::vector<double> sums{0.0};
+        std::vector<double> weights;
         for (u32 prim = 0; prim < mesh.triangle_count; ++prim)
-            sums.push_back(sums.back() + cluster_weight(scene_, at, prim, estimates_, sides));
-        for (double sum : sums)
-            out_.cluster_cdf.push_back(sums.back() > 0.0 ? static_cast<float>(sum / sums.back()) : 0.0f);
-        c.light = static_cast<float>(sums.back());
+            weights.push_back(cluster_weight(scene_, at, prim, estimates_, sides));
+        out_.cluster_cdf.resize(c.cdf + weights.size() + 1);
+        fill_cdf(weights, &out_.cluster_cdf[c.cdf]);
+        c.light = static_cast<float>(std::accumulate(weights.begin(), weights.end(), 0.0));
         for (u32 v = 0; v < mesh.vertex_count; ++v) {
             Vec3 p = vertex_at(scene_, mesh, v);
             if (!finite_v(p)) continue;

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "cpu/light/build.h"
+#include "cpu/light/cdf.h"
 #include "luch/light/world.h"
 #include "luch/math/bounds.h"
 
@@ -11,19 +12,6 @@ namespace {
 float usable_luminance(Color c) {
     float l = luminance(abs_v(c));
     return finite_f(l) ? l : 0.0f;  // a broken texel must not own the map
-}
-
-// Rises from exactly 0 to exactly 1; row `of` masses.
-void fill_cdf(const std::vector<double>& masses, float* cdf) {
-    double total = 0.0, running = 0.0;
-    for (double m : masses) total += m;
-    cdf[0] = 0.0f;
-    for (size_t i = 0; i < masses.size(); ++i) {
-        running += masses[i];
-        cdf[i + 1] = total > 0.0 ? static_cast<float>(running / total)
-                                 : static_cast<float>(i + 1) / static_cast<float>(masses.size());
-    }
-    cdf[masses.size()] = 1.0f;
 }
 
 // Fills density with luminance times cosine of what rises above the mean: rays that leave by the BSDF find the even

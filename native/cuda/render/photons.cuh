@@ -39,8 +39,7 @@ __device__ __forceinline__ void photon_entry(const RenderTask& task, u32 entry) 
     ClosureSet set;
     points.count = 1;
     float time = time_of_ray(wave, k);
-    SurfacePoint spawn = surface_point(scene.view, hit, ray, time);
-    setup_surface_lane(scene.view, surface_inputs(path, slot, hit, spawn, ray.direction, time), points, 0);
+    SurfacePoint spawn = setup_hit_lane(scene, path, slot, hit, ray, time, points, 0);
     const MaterialView& material = scene.view.materials[material_at(scene.view, hit.instance, hit.prim)];
     run_program(context_of(scene.view, material.program, points, set, nullptr));
     Ray next;

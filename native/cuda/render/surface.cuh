@@ -41,8 +41,7 @@ __device__ __forceinline__ bool shade_entry(const RenderTask& task, u32 entry) {
     ClosureSet set;
     points.count = 1;
     float time = time_of_ray(wave, k);
-    SurfacePoint spawn = surface_point(scene.view, hit, ray, time);
-    setup_surface_lane(scene.view, surface_inputs(path, slot, hit, spawn, ray.direction, time), points, 0);
+    SurfacePoint spawn = setup_hit_lane(scene, path, slot, hit, ray, time, points, 0);
     u32 aov_floats = 4u * task.film.layout.aov_count;
     float* aovs = wave.aovs ? wave.aovs + u64(entry) * aov_floats : nullptr;
     for (u32 i = 0; aovs && i < aov_floats; ++i) aovs[i] = 0.0f;

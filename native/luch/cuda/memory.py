@@ -10,6 +10,7 @@ import numpy as np
 from luch._native import core
 from luch.cuda.device import cupy
 
+BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
 NONE = 0xFFFFFFFF  # of luch/platform.h: not there
 MARK_CHANNELS = 4  # of luch/film/film.h
 RAY_CAMERA, RAY_SHADOW = 1, 32  # RayKind of luch/geometry/ray.h
@@ -183,6 +184,16 @@ class Memory:
         at = self._fields[name]
         self._task[at : at + len(data)] = data
         self.tasks = [task[:at] + data + task[at + len(data) :] for task in self.tasks]
+
+    def launch(self, kernel: Any, turn: int, threads: int, *more: bytes) -> None:
+        """A stage, one thread an entry. turn: which of the two queues of rays is this round's."""
+        kernel.launch(-(-threads // BLOCK), BLOCK, [self.tasks[turn], *more])
+
+    def sort_hits(self, paths: Any, turn: int, rays: int) -> None:
+        """By material. paths: the module RENDER_PATHS."""
+        self.launch(paths.kernel("count_materials"), turn, rays)
+        self.launch(paths.kernel("place_materials"), turn, 1)
+        self.launch(paths.kernel("sort_hits"), turn, rays)
 
     def address(self, name: str) -> int:
         """Of an array on the device; 0 if this scene needs no such array."""

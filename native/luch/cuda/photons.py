@@ -15,21 +15,18 @@ import numpy as np
 
 from luch._native import core
 from luch.cuda.device import cupy
-from luch.cuda.memory import Memory
+from luch.cuda.memory import BLOCK, Memory
 
-BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
 # Photons started at once, at most, and records that there is room for at first, for each of them: it leaves one, or few.
 MOST_AT_ONCE = 1 << 20
 RECORDS = 2.0
-# Of luch::Photon, in words: the number of its start, and its bounces.
-START, BOUNCE = 3, 11
 
 
 def bytes_of_maps(pixels: int) -> int:
     """What the largest map of such a picture may take, with what sorts it."""
     sizes = core.render.task_sizes()
-    record = 3 * sizes["photon"] + 16 + core.render.photon_map_layout()["level_count"] * (sizes["photon_place"] + 4)
-    return int(core.render.photon_starts(pixels) * core.render.MOST_SAMPLES_OF_MAP * record)
+    record = 3 * sizes["photon"] + 16 + core.photons.layout()["level_count"] * (sizes["photon_place"] + 4)
+    return int(core.photons.starts(pixels) * core.photons.MOST_SAMPLES_OF_MAP * record)
 
 
 class PhotonMaps:
@@ -40,9 +37,9 @@ class PhotonMaps:
         """memory: of a renderer, whose waves are at rest meanwhile; paths, stages: its kernels; tracer: SceneTracer."""
         self._memory, self._paths, self._stages, self._tracer = memory, paths, stages, tracer
         self._most_rounds, self._reach, self._goes_on = most_rounds, float(facts["casters_reach"]), goes_on
-        self._layout = core.render.photon_map_layout()
+        self._layout = core.photons.layout()
         self._record = core.render.task_sizes()["photon"]
-        self._starts = core.render.photon_starts(memory.pixels)
+        self._starts = core.photons.starts(memory.pixels)
         self._map: int | None = None  # that is at hand
         self._pilot: Any = None
         self._expected: list[Any] = []
@@ -52,13 +49,13 @@ class PhotonMaps:
 
     def serve(self, sample: int) -> bool:
         """Makes the map that serves a sample, unless it is at hand. False when cancelled."""
-        number = core.render.first_of_map(sample)
+        number = core.photons.first_of_map(sample)
         if number == self._map:
             return True
         began = time.perf_counter()
         if self._pilot is None and not self._look():
             return False
-        starts = self._starts * core.render.samples_of_map(number, core.render.MOST_SAMPLES_OF_MAP)
+        starts = self._starts * core.photons.samples_of_map(number, core.photons.MOST_SAMPLES_OF_MAP)
         photons = self._trace(number, starts)
         if photons is None:
             return False
@@ -71,11 +68,11 @@ class PhotonMaps:
 
     def _look(self) -> bool:
         """The pilot: how far to look for photons, and where."""
-        photons = self._trace(self._layout["pilot_map"], core.render.pilot_starts(self._memory.pixels))
+        photons = self._trace(self._layout["pilot_map"], core.photons.pilot_starts(self._memory.pixels))
         if photons is None:
             return False
         records = cupy().asnumpy(photons).view(np.uint8).reshape(-1)
-        self._pilot = core.render.PhotonPilot(records, self._memory.pixels, self._reach)
+        self._pilot = core.photons.PhotonPilot(records, self._memory.pixels, self._reach)
         self._expected = [cupy().asarray(level) for level in self._pilot.expected()]
         return True
 
@@ -97,7 +94,8 @@ class PhotonMaps:
             self.stats["photons_landed"] += landed
         self.stats["photons"] += starts
         photons = pieces[0] if len(pieces) == 1 else cp.concatenate(pieces)
-        order = cp.argsort(photons[:, START].astype(np.uint64) << np.uint64(8) | photons[:, BOUNCE].astype(np.uint64))
+        start, bounce = (photons[:, self._layout[name]].astype(np.uint64) for name in ("start_word", "bounce_word"))
+        order = cp.argsort(start << np.uint64(8) | bounce)
         return cp.ascontiguousarray(photons[order])
 
     def _trace_some(self, number: int, first: int, count: int, room: Any) -> int | None:
@@ -106,7 +104,7 @@ class PhotonMaps:
         landed = cupy().zeros(1, np.uint32)
         memory.lend(room, landed)
         memory.clear("rays")
-        self._launch(self._stages.kernel("begin_photons"), 0, count, struct.pack("<3I", number, first, count))
+        memory.launch(self._stages.kernel("begin_photons"), 0, count, struct.pack("<3I", number, first, count))
         turn, left, rays = 0, self._most_rounds, memory.count("rays")
         while rays and left:
             if not self._goes_on():
@@ -114,11 +112,9 @@ class PhotonMaps:
                 return None
             left -= 1
             self._tracer.closest_of_wave(memory, turn)
-            self._launch(paths.kernel("count_materials"), turn, rays)
-            self._launch(paths.kernel("place_materials"), turn, 1)
-            self._launch(paths.kernel("sort_hits"), turn, rays)
-            self._launch(self._stages.kernel("shade_photons"), turn, rays)
-            self._launch(paths.kernel("next_round"), turn, 1)
+            memory.sort_hits(paths, turn, rays)
+            memory.launch(self._stages.kernel("shade_photons"), turn, rays)
+            memory.launch(paths.kernel("next_round"), turn, 1)
             turn ^= 1
             rays = memory.count("rays")
         memory.clear("rays")
@@ -155,6 +151,3 @@ class PhotonMaps:
                 self.stats["photon_radius_m"] = struct.unpack("<f", radius)[0]
         self._memory.place("scene.photons", bytes(view))
         self.stats["photon_map_bytes"] = sum(int(array.nbytes) for array in self._held)
-
-    def _launch(self, kernel: Any, turn: int, threads: int, *more: bytes) -> None:
-        kernel.launch(-(-threads // BLOCK), BLOCK, [self._memory.tasks[turn], *more])

@@ -21,7 +21,7 @@ from luch.adaptive import parts, regions_of
 from luch.cuda.compiler import NotWanted, load
 from luch.cuda.device import DeviceError, cupy, describe, enter_context
 from luch.cuda.host import HostFilm, HostScene
-from luch.cuda.memory import NONE, RAY_CAMERA, Beside, Memory, bytes_per_path
+from luch.cuda.memory import BLOCK, NONE, RAY_CAMERA, Beside, Memory, bytes_per_path
 from luch.cuda.photons import PhotonMaps, bytes_of_maps
 from luch.cuda.plan import sampler_flags
 from luch.cuda.scene_kernels import SceneKernels
@@ -30,7 +30,6 @@ from luch.cuda.trace import MOVING, Left, SceneTracer, TreesTooDeep
 from luch.cuda.upload import PIXELS, Blocks, DeviceCopy, Links, images_to_leave, too_large
 from luch.ledger import REFUSALS
 
-BLOCK = 128  # STAGE_BLOCK of render/launch.cuh
 # Paths under way at once, for each multiprocessor, rounded down to a power of two. Late bounces of few paths leave a GPU
 # idle: on an H100 (132 of them) waves of 2, 4, 8 and 16 million took 4.9, 3.6, 3.0 and 2.8 s for little_lamp, 12.2, 10.1,
 # 9.1 and 8.8 s for white_room. More only cost memory and time until a cancel is heard, which is a wave's.
@@ -59,7 +58,7 @@ def parted(first: int, count: int, most: int, by_maps: bool = False) -> Iterator
     while first < end:
         count = min(most, end - first, (1 << first.bit_length()) - first)
         if by_maps:
-            count = core.render.samples_of_map(first, count)
+            count = core.photons.samples_of_map(first, count)
         yield first, count
         first += count
 
@@ -365,9 +364,7 @@ class DeviceRenderer(HostFilm):
             shadows += self._cast_shadows(turn)
         with self._clock("light"):
             self._launch(stages.kernel("find_light"), turn, rays)
-        self._launch(paths.kernel("count_materials"), turn, rays)
-        self._launch(paths.kernel("place_materials"), turn, 1)
-        self._launch(paths.kernel("sort_hits"), turn, rays)
+        memory.sort_hits(paths, turn, rays)
         with self._clock("surfaces"):
             self._launch(stages.kernel("shade_surfaces"), turn, rays)
         if self._walks is not None and (walks := memory.count("walks")):
@@ -409,7 +406,7 @@ class DeviceRenderer(HostFilm):
         return self._clocks.running(stage) if self._timed else nullcontext()
 
     def _launch(self, kernel: Any, turn: int, threads: int, *more: bytes) -> None:
-        kernel.launch(-(-threads // BLOCK), BLOCK, [self._memory.tasks[turn], *more])
+        self._memory.launch(kernel, turn, threads, *more)
 
     def cancel(self) -> None:
         """Callable from any thread: render() returns within one wave's time."""
@@ -494,24 +491,22 @@ class DeviceRenderer(HostFilm):
             totals = dict(zip(TOTALS, (int(x) for x in self._memory.totals.get()), strict=True))
             shading = self._shading_kernel()
         totals["non_finite_samples"] = sum(totals[cause] for cause in REFUSALS)
-        counts = {**self._counts, **totals}
+        counts: dict[str, Any] = {**self._counts, **totals}
         counts["shadow_rays"] += counts.pop("transparent_rays")
-        return (
-            counts
-            | ({} if self._photons is None else self._photons.stats)
-            | {
-                "trace_seconds": self._trace_seconds,
-                "upload_seconds": self._upload_seconds,
-                "device_scene_bytes": self._arrays.bytes + self._tracer.bytes,
-                "device_film_and_paths_bytes": self._memory.bytes,
-                "paths_at_once": self._memory.slots,
-                "paths_to_fill": self._paths_that_fill(),
-                "path_bytes": core.render.task_sizes()["path"],
-                "kernel_plan": self._stages.plan,
-                "shading_kernel": shading,
-                "kernels": "general" if self._stages.general else "the scene's own",
-                "kernels_settled": self._stages.settled,
-                "general_kernels": self._stages.has_general,  # whether there are such that serve this scene
-                "kernel_compile_seconds": self._stages.compile_seconds,
-            }
-        )
+        if self._photons is not None:
+            counts |= self._photons.stats
+        return counts | {
+            "trace_seconds": self._trace_seconds,
+            "upload_seconds": self._upload_seconds,
+            "device_scene_bytes": self._arrays.bytes + self._tracer.bytes,
+            "device_film_and_paths_bytes": self._memory.bytes,
+            "paths_at_once": self._memory.slots,
+            "paths_to_fill": self._paths_that_fill(),
+            "path_bytes": core.render.task_sizes()["path"],
+            "kernel_plan": self._stages.plan,
+            "shading_kernel": shading,
+            "kernels": "general" if self._stages.general else "the scene's own",
+            "kernels_settled": self._stages.settled,
+            "general_kernels": self._stages.has_general,  # whether there are such that serve this scene
+            "kernel_compile_seconds": self._stages.compile_seconds,
+        }

@@ -181,32 +181,29 @@ def _add_limits(effects: Effects, shown: Shown, diffuse: bool, glossy: bool) -> 
     blur = settings.filter_glossy
     mapped = effects["photon maps"].on
     on = blur > 0.0 and (glossy or through) and not mapped
-    off = (
-        "photon maps need none"
-        if mapped and blur
-        else "nothing reflects or transmits"
-        if blur
-        else "Filter Glossy is 0"
-    )
+    wanted_in_vain = "photon maps need none" if mapped else "nothing reflects or transmits"
+    off = wanted_in_vain if blur > 0.0 else "Filter Glossy is 0"
     effects.add("Paths", "filter glossy", on, f"Filter Glossy is {blur:g}" if on else off)
 
 
 _PHOTONS = "caustics of surfaces smoother than a roughness of .32 are brought by photons"
 
 
-def _add_photon_maps(effects: Effects, settings: Settings) -> None:
-    lit = any(effects[name].on for name in (*LAMPS.values(), "emissive meshes", "world light sampling"))
+def no_photons(effects: Effects) -> str:
+    """Why photon maps would bring nothing to the scene; "": they would."""
+    if effects["volumes"].on:
+        return "the scene has volumes, through which no photon is followed: paths find all light"
     caustics = any(effects[f"{kind} caustics"].on for kind in ("reflective", "refractive"))
-    caustics = caustics and effects["indirect light"].on
-    if settings.integrator != "PHOTON":
-        off = "the integrator is another"
-    elif effects["volumes"].on:
-        off = "the scene has volumes, through which no photon is followed: paths find all light"
-    else:
-        off = "no light can be chosen to send photons from" if caustics else "there are no caustics"
-    on = settings.integrator == "PHOTON" and not effects["volumes"].on and caustics and lit
-    cost = "photons are traced for every few samples, and gathered at every point" if on else ""
-    effects.add("Paths", "photon maps", on, _PHOTONS if on else off, cost=cost)
+    if not (caustics and effects["indirect light"].on):
+        return "there are no caustics"
+    lit = any(effects[name].on for name in (*LAMPS.values(), "emissive meshes", "world light sampling"))
+    return "" if lit else "no light can be chosen to send photons from"
+
+
+def _add_photon_maps(effects: Effects, settings: Settings) -> None:
+    off = no_photons(effects) if settings.integrator == "PHOTON" else "the integrator is another"
+    cost = "" if off else "photons are traced for every few samples, and gathered at every point"
+    effects.add("Paths", "photon maps", not off, off or _PHOTONS, cost=cost)
 
 
 def add_film(effects: Effects, shown: Shown) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 from luch import denoise, samplers
 from luch.effects import Effects
+from luch.effects.picture import no_photons
 from luch.effects.removal import REMOVALS
 from luch.integrators import INTEGRATORS
 from luch.scene import Scene, Settings
@@ -99,7 +100,7 @@ def plan(
     _add_structures(variants, absent, settings, accelerator, triangles)
     _add_precisions(variants, settings)
     _add_samplers(variants, settings)
-    _add_integrators(variants, absent, settings, on)
+    _add_integrators(variants, absent, settings, effects)
     _add_bounces(variants, absent, settings, on)
     _add_shortcuts(variants, settings, on)
     _add_light_sampling(variants, absent, settings, on)
@@ -138,10 +139,10 @@ def _add_samplers(variants: list[Variant], settings: Settings) -> None:
             variants.append(Variant(f"{family.title} sampler", "Samplers", family.reason, {"sampler": name}, rank=4))
 
 
-def _add_integrators(variants: list[Variant], absent: list[str], settings: Settings, on: set[str]) -> None:
-    caustics = "indirect light" in on and on & {"reflective caustics", "refractive caustics"}
-    if not caustics or "volumes" in on:
-        absent.append("Photon maps: the scene has no caustics, or volumes through which no photon is followed.")
+def _add_integrators(variants: list[Variant], absent: list[str], settings: Settings, effects: Effects) -> None:
+    obstacle = no_photons(effects)
+    if obstacle:
+        absent.append(f"Photon maps: {obstacle}.")
         return
     for name, kind in INTEGRATORS.items():
         if name != settings.integrator:

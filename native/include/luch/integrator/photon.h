@@ -38,21 +38,15 @@ LUCH_FN PhotonGoal goal_of(const PathState& path) {
             float_bits(path.pass_glossy.x), float_bits(path.pass_glossy.y)};
 }
 
-// Index of the first sum above u, by halves; *probability of that entry.
-LUCH_FN u32 choose_by_sums(const float* sums, u32 count, float u, float* probability) {
-    u32 low = 0, high = count - 1u;
-    while (low < high) {
-        u32 middle = (low + high) / 2u;
-        if (u < sums[middle])
-            high = middle;
-        else
-            low = middle + 1u;
-    }
-    *probability = sums[low] - (low == 0u ? 0.0f : sums[low - 1u]);
-    return low;
+// Chooses an entry of a table (find_interval); *probability is multiplied by its own.
+LUCH_FN u32 choose_by_cdf(const float* cdf, u32 count, float u, float* probability) {
+    float within;
+    u32 i = find_interval(cdf, count, u, &within);
+    *probability *= cdf[i + 1u] - cdf[i];
+    return i;
 }
 
-// Starts a photon; false where it brings nothing. emission(sample, path, footprint, time): of the light's program there.
+// Starts a photon; false where it brings nothing. emission(sample, path, time): of the light's program there.
 template <class Emission>
 LUCH_FN bool begin_photon(const RenderView& scene, u32 map, u32 start, Emission& emission, PathState& path, Ray* ray,
                           float* time) {
@@ -65,14 +59,13 @@ LUCH_FN bool begin_photon(const RenderView& scene, u32 map, u32 start, Emission&
     Vec2 u_object = sample_2d(path.sampler, first + DIM_CASTER_OBJECT);
     path.dimension = first + DIMENSIONS_PHOTON;
     *time = has_motion(scene) ? shutter_time(*scene.shutter, u_object.y, 0u, 1u) : SHUTTER_MIDDLE;
-    float by_instance, by_prim;
-    u32 instance = casters.instances[choose_by_sums(casters.instance_sums, casters.count, u_object.x, &by_instance)];
+    float chosen = 1.0f;
+    u32 instance = casters.instances[choose_by_cdf(casters.instance_cdf, casters.count, u_object.x, &chosen)];
     u32 object = scene.view.instances[instance].object, from = casters.object_first[object];
-    u32 prim = casters.prims[from + choose_by_sums(casters.prim_sums + from, casters.object_first[object + 1u] - from,
-                                                   u_place.z, &by_prim)];
-    if (!(by_instance * by_prim > 0.0f)) return false;
+    u32 prim = casters.prims[from + choose_by_cdf(casters.prim_cdf + from + object,
+                                                  casters.object_first[object + 1u] - from, u_place.z, &chosen)];
+    if (!(chosen > 0.0f)) return false;
     float root = sqrt_f(u_place.x);
-    Hit hit{0.0f, prim, instance, root * (1.0f - u_place.y), root * u_place.y};
     InstanceView moved;
     const InstanceView& at = instance_at_time(scene.view, instance, *time, &moved);
     Triangle triangle = triangle_at(scene.view, at, prim, *time);
@@ -81,12 +74,12 @@ LUCH_FN bool begin_photon(const RenderView& scene, u32 map, u32 start, Emission&
     float area = 0.5f * length(spread);
     if (!(area > 0.0f)) return false;
     Vec3 ng = spread * (0.5f / area);
-    Vec3 p = triangle_point(triangle, hit.u, hit.v, at).p;
+    Vec3 p = triangle_point(triangle, root * (1.0f - u_place.y), root * u_place.y, at).p;
     LightSample s = sample_light(scene.view, p, ng, true, u_light.z, {u_light.x, u_light.y}, *time);
     if (s.kind == EmitterKind::NONE_ || !(s.pdf_sa > 0.0f)) return false;
     path.flags = u32(PATH_DIFFUSE) | PATH_DIFFUSE_ANCESTOR | PATH_REFLECT | PATH_NO_MIS;
     Color light = emission(s, path, *time) * s.radiance;
-    float density = by_instance * by_prim / area * s.pdf_sa;
+    float density = chosen / area * s.pdf_sa;
     path.throughput = light * (abs_f(dot(ng, s.direction)) / density);
     if (is_zero(path.throughput) || !finite_v(path.throughput)) return false;
     float distance = finite_f(s.distance) ? s.distance : casters.reach;
@@ -225,17 +218,14 @@ LUCH_FN void add_photons(const RenderView& scene, FilmWriter& writer, const Path
     // A path would have to leave here by a bounce, and then be lit by more than what it comes upon.
     if (u32(path.diffuse_bounce) + 1u >= scene.limits.diffuse) return;
     BsdfValue value = gather_photons(scene, writer, path, points, lane, set);
-    Color c = path.throughput * total(value);
+    Color sum = total(value), c = path.throughput * sum;
     const Color whole = c;
     if (is_zero(c) || !admit(scene, writer, c, 1u, REFUSED_DIRECT)) return;
     note_clamped(writer, whole, c);
     film_add_combined(writer, path.pixel, c);
     if (!wants_light_passes(writer.film.layout)) return;
     Color diffuse = path.pass_diffuse, glossy = path.pass_glossy;
-    if (!(path.flags & PATH_PASS_CHOSEN)) {
-        Color sum = total(value);
-        diffuse = share(value.diffuse, sum), glossy = share(value.glossy, sum);
-    }
+    if (!(path.flags & PATH_PASS_CHOSEN)) diffuse = share(value.diffuse, sum), glossy = share(value.glossy, sum);
     add_to_light_passes(writer, path.pixel, c, diffuse, glossy, path.flags & PATH_VOLUME_PASS, false);
 }
 

@@ -64,11 +64,11 @@ struct PhotonMap {
 // Where photons begin: triangles whose material casts caustics, chosen by object, then by area.
 struct CastersView {
     const u32* instances;
-    const float* instance_sums;  // [count]: shares up to and with each, the last 1
+    const float* instance_cdf;   // [count + 1], for find_interval
     u32 count;
     const u32* object_first;     // [objects + 1]: its triangles among those below
     const u32* prims;
-    const float* prim_sums;      // as instance_sums, within an object
+    const float* prim_cdf;       // object by object, one entry more than it has triangles
     float reach;                 // beyond everything that there is, metres: where light from infinity starts
 };
 

@@ -45,6 +45,14 @@ LUCH_FN LaneInputs surface_inputs(const PathState& path, u32 path_index, const H
     return in;
 }
 
+// A lane of points for a hit, and where it is. path_index, time: of the path; ray: the one that found the hit.
+LUCH_FN SurfacePoint setup_hit_lane(const RenderView& scene, const PathState& path, u32 path_index, const Hit& hit,
+                                    const Ray& ray, float time, ShadePoints& points, int lane) {
+    SurfacePoint at = surface_point(scene.view, hit, ray, time);
+    setup_surface_lane(scene.view, surface_inputs(path, path_index, hit, at, ray.direction, time), points, lane);
+    return at;
+}
+
 // Filter Glossy: after improbable bounces sharp lobes are blurred.
 LUCH_FN void soften(const PathLimits& limits, const PathState& path, ClosureSet& set) {
     if (!plan::FILTER_GLOSSY || !(limits.filter_glossy > 0.0f)) return;
