@@ -37,7 +37,7 @@ OPTIONS = (
     "--luch-gpus N",
     "--luch-seed N",
     "--luch-sampler SOBOL|INDEPENDENT|LATTICE",
-    "--luch-integrator PATH|PHOTON",
+    "--luch-integrator PATH|PHOTON|DISTRIBUTION",
     "--luch-mergeable",
     "--luch-first-sample N",
     "--luch-samples-in-all N",

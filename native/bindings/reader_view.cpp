@@ -24,12 +24,6 @@ SamplerFamily named_sampler(const std::string& name) {
     return SamplerFamily(found - std::begin(SAMPLER_NAMES));
 }
 
-bool wants_photon_maps(const std::string& integrator) {
-    if (integrator != "PATH" && integrator != "PHOTON")
-        throw std::invalid_argument("Settings: the integrator is '" + integrator + "'; it can be PATH or PHOTON.");
-    return integrator == "PHOTON";
-}
-
 }  // namespace
 
 void Reader::read_camera_motion(const py::object& motion, cpu::CameraSpec spec, const cpu::FrameSpec& frame) {
@@ -135,13 +129,14 @@ void Reader::read_curve_settings(const py::object& settings) {
 void Reader::read_settings(const py::object& settings) {
     auto count = [&](const char* name) { return py::cast<u32>(settings.attr(name)); };
     auto number = [&](const char* name) { return py::cast<float>(settings.attr(name)); };
+    auto bounces = [&](const char* kind) { return py::cast<u32>(settings.attr("bounces")(kind)); };
     PathLimits& limits = input.limits;
     // As in Cycles 0 bounces still mean direct light, so limits count one more; of transparency 0 means none.
     limits.bounces = count("max_bounces") + 1;
-    limits.diffuse = count("diffuse_bounces") + 1;
-    limits.glossy = count("glossy_bounces") + 1;
-    limits.transmission = count("transmission_bounces") + 1;
-    limits.volume = count("volume_bounces") + 1;
+    limits.diffuse = bounces("diffuse") + 1;
+    limits.glossy = bounces("glossy") + 1;
+    limits.transmission = bounces("transmission") + 1;
+    limits.volume = bounces("volume") + 1;
     limits.transparent = count("transparent_bounces");
     limits.min_bounces = count("min_light_bounces") + 1;
     limits.min_transparent = count("min_transparent_bounces") + 1;
@@ -151,7 +146,7 @@ void Reader::read_settings(const py::object& settings) {
     limits.caustics_reflective = py::cast<bool>(settings.attr("caustics_reflective"));
     limits.caustics_refractive = py::cast<bool>(settings.attr("caustics_refractive"));
     limits.ao_distance = number("ao_distance");
-    input.photon_maps = wants_photon_maps(py::cast<std::string>(settings.attr("integrator")));
+    input.photon_maps = py::cast<bool>(settings.attr("photon_maps"));
     input.light_tree = py::cast<bool>(settings.attr("light_tree"));
     read_curve_settings(settings);
     input.seed = count("seed");

@@ -129,7 +129,7 @@ def _adaptive_for(film: Film, settings: Settings) -> Adaptive | None:
 def _not_adaptive(settings: Settings) -> list[str]:
     if not (settings.adaptive and settings.error_limit > 0.0):
         return []
-    if settings.integrator == "PHOTON":
+    if settings.photon_maps:
         return ["Adaptive Sampling is left out: with photon maps a sample of all pixels shares its photons."]
     if settings.mergeable:
         return ["Adaptive Sampling is left out: pictures that are merged or verified have the same samples everywhere."]

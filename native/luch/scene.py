@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from luch import integrators
+
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 U32 = NDArray[np.uint32]
@@ -351,6 +353,16 @@ class Settings:
     quality: str = "CUSTOM"
     quality_report: str = ""  # a report.json that the dial chooses by; "": a pilot before the render
     ao_distance: float = 10.0  # Ambient Occlusion pass; Blender's world.light_settings.distance
+
+    def bounces(self, kind: str) -> int:
+        """How many bounces of a kind ("diffuse", "volume", ...) the integrator follows. ValueError: it is unknown."""
+        limit: int = getattr(self, f"{kind}_bounces")
+        return 0 if kind in integrators.named(self.integrator).ends_at else limit
+
+    @property
+    def photon_maps(self) -> bool:
+        """Whether the integrator brings caustics by photons. ValueError: it is unknown."""
+        return integrators.named(self.integrator).photons
 
 
 @dataclass

@@ -298,5 +298,5 @@ def _settings(rng: Rng) -> Settings:
         precision=("WATERTIGHT", "FAST", "DOUBLE")[int(rng.integers(3))],
         estimate_error=chance(rng, 0.7),
         curve_shape=("RIBBON", "THICK", "THICK_LINEAR")[int(rng.spawn(1)[0].integers(3))],
-        integrator="PHOTON" if chance(rng.spawn(1)[0], 0.25) else "PATH",
+        integrator=("PATH", "PATH", "PHOTON", "DISTRIBUTION")[int(rng.spawn(1)[0].integers(4))],
     )

@@ -160,7 +160,7 @@ def test_a_cancel_is_heard_while_photons_are_traced_and_sorted(after: float) -> 
 
 
 def test_an_unknown_integrator_is_told() -> None:
-    with pytest.raises(ValueError, match="the integrator is 'BIDIRECTIONAL'; it can be PATH or PHOTON"):
+    with pytest.raises(ValueError, match="the integrator is 'BIDIRECTIONAL'; it can be PATH, PHOTON or DISTRIBUTION"):
         render(scene_through_glass(integrator="BIDIRECTIONAL"))
 
 

@@ -182,7 +182,8 @@ def test_what_is_not_tried_is_told_with_its_reason() -> None:
     found = plan(scene, effects_of(scene), "BVH", 100_000)
     assert not any(variant.group in ("Bounces", "Russian roulette") for variant in found.variants)
     assert any(line.startswith("Bounces") for line in found.absent)
-    assert any(line.startswith("Photon maps") for line in found.absent)
+    assert any(line.startswith("Path Tracing and Photon Maps: there are no") for line in found.absent)
+    assert any(line.startswith("Distribution Ray Tracing: no light goes") for line in found.absent)
     integrators = [variant for variant in found.variants if variant.group == "Integrators"]
     assert not integrators
 
@@ -190,11 +191,16 @@ def test_what_is_not_tried_is_told_with_its_reason() -> None:
 def test_each_other_integrator_is_tried_where_it_can_find_light_of_its_own() -> None:
     scene = scene_through_glass(integrator="PATH")
     found = plan(scene, effects_of(scene), "BVH", 4)
-    (photons,) = [variant for variant in found.variants if variant.group == "Integrators"]
+    photons, distribution = [variant for variant in found.variants if variant.group == "Integrators"]
+    assert distribution.settings == {"integrator": "DISTRIBUTION"} and distribution.biased
     assert photons.settings == {"integrator": "PHOTON"} and photons.biased
     scene.settings.integrator = "PHOTON"
-    (paths,) = [v for v in plan(scene, effects_of(scene), "BVH", 4).variants if v.group == "Integrators"]
+    paths, _ = [v for v in plan(scene, effects_of(scene), "BVH", 4).variants if v.group == "Integrators"]
     assert paths.settings == {"integrator": "PATH"}
+    scene.settings.integrator = "DISTRIBUTION"
+    found = plan(scene, effects_of(scene), "BVH", 4)
+    assert [v.settings["integrator"] for v in found.variants if v.group == "Integrators"] == ["PATH", "PHOTON"]
+    assert found.variants[0].settings["integrator"] == "PATH"  # what takes nothing from the light
 
 
 # -- the whole --------------------------------------------------------------------------------

@@ -97,7 +97,7 @@ def plan_of(scene: Scene, operations: set[str], facts: Mapping[str, Any]) -> dic
     sampler = {SAMPLER: NAMES.index(scene.settings.sampler)}
     if ALL in scene.settings.force_effects:
         every = dict.fromkeys([*NEEDED_BY, *MADE_BY, *TOLD, *POSSIBLE], True)
-        every["PHOTONS"] = scene.settings.integrator == "PHOTON"  # another way to find light, no work done in vain
+        every["PHOTONS"] = scene.settings.photon_maps  # another way to find light, no work done in vain
         return every | {"MOST_LOBES": MOST_LOBES, CURVE_SHAPE: ANY_CURVE_SHAPE} | sampler
     effects, possible = effects_of(scene), possible_in(scene)
     plan: dict[str, bool | int] = {

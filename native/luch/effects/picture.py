@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from luch import integrators
 from luch.effects.lights import LAMPS
 from luch.effects.shown import Shown
 from luch.effects.surfaces import facts
@@ -120,18 +121,17 @@ def add_paths(effects: Effects, shown: Shown) -> None:
     """Which bounces can matter, and what cuts light off."""
     settings = shown.scene.settings
     most = [
-        _add_bounces(effects, shown, "diffuse", ("diffuse",), settings.diffuse_bounces),
-        _add_bounces(effects, shown, "glossy", ("glossy",), settings.glossy_bounces),
+        _add_bounces(effects, shown, "diffuse", ("diffuse",)),
+        _add_bounces(effects, shown, "glossy", ("glossy",)),
         _add_bounces(
             effects,
             shown,
             "transmission",
             ("transmission", "translucency", "thin subsurface", "hair transmission"),
-            settings.transmission_bounces,
         ),
     ]
     most.append(add_volume_bounces(effects, shown))
-    _add_bounces(effects, shown, "transparent", ("transparency",), settings.transparent_bounces)
+    _add_bounces(effects, shown, "transparent", ("transparency",))
     reach = min(settings.max_bounces, sum(most))
     if reach:
         reason = f"{reach} at most: what the kinds that are on allow, up to {settings.max_bounces}"
@@ -143,13 +143,16 @@ def add_paths(effects: Effects, shown: Shown) -> None:
     _add_limits(effects, shown, effects["diffuse bounces"].on, effects["glossy bounces"].on)
 
 
-def _add_bounces(effects: Effects, shown: Shown, kind: str, traits: tuple[str, ...], limit: int) -> int:
+def _add_bounces(effects: Effects, shown: Shown, kind: str, traits: tuple[str, ...]) -> int:
     """Returns how many bounces of the kind a path can make before it ends."""
     name = f"{kind} bounces"
+    settings = shown.scene.settings
+    limit = settings.bounces(kind)
+    none = integrators.named(settings.integrator).why_none(kind)
     for trait in traits:
         found = [surface for surface in shown.surfaces if trait in surface.traits]
         if found:
-            reason = f"up to {limit}: {facts(found, trait)}" if limit else f"set to 0, though {facts(found, trait)}"
+            reason = f"up to {limit}: {facts(found, trait)}" if limit else f"{none}, though {facts(found, trait)}"
             effects.add("Paths", name, limit > 0, reason)
             return limit
     verb = {"diffuse": "scatters diffusely", "glossy": "reflects", "transmission": "transmits light"}
@@ -201,7 +204,7 @@ def no_photons(effects: Effects) -> str:
 
 
 def _add_photon_maps(effects: Effects, settings: Settings) -> None:
-    off = no_photons(effects) if settings.integrator == "PHOTON" else "the integrator is another"
+    off = no_photons(effects) if settings.photon_maps else "the integrator is another"
     cost = "" if off else "photons are traced for every few samples, and gathered at every point"
     effects.add("Paths", "photon maps", not off, off or _PHOTONS, cost=cost)
 

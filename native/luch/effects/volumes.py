@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from luch import integrators
 from luch.effects.shown import Shown
 from luch.effects.table import Effects
 from luch.scene import Medium
@@ -25,14 +26,16 @@ def add_volumes(effects: Effects, shown: Shown) -> None:
 
 def add_volume_bounces(effects: Effects, shown: Shown) -> int:
     """Returns how often a path may scatter in volumes."""
-    limit = shown.scene.settings.volume_bounces
+    settings = shown.scene.settings
+    limit = settings.bounces("volume")
     scattering = [title for title, medium in media_shown(shown) if scatters(medium)]
     if not scattering:
         off = f"no volume that is shown scatters light: the limit of {limit} cannot matter"
         effects.add("Paths", "volume bounces", False, off)
         return 0
     reason = f"up to {limit} after the first: {scattering[0]} scatters light"
-    none = f"set to 0: light that {scattering[0]} scatters once, and no more"
+    why = integrators.named(settings.integrator).why_none("volume")
+    none = f"{why}: light that {scattering[0]} scatters once, and no more"
     effects.add("Paths", "volume bounces", limit > 0, reason if limit else none)
     return limit
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from luch import denoise, samplers
-from luch.effects import Effects
+from luch.effects import Effects, effects_of
 from luch.effects.picture import no_photons
 from luch.effects.removal import REMOVALS
-from luch.integrators import INTEGRATORS
+from luch.integrators import DEFAULT, INTEGRATORS, Integrator, named
 from luch.scene import Scene, Settings
 
 EXACT, AS_SET = "exact", "as set"
@@ -77,6 +77,8 @@ def exact_settings(settings: Settings) -> dict[str, Any]:
                "caustics_refractive": True}  # fmt: skip
     if settings.precision == "FAST":
         wanted["precision"] = "WATERTIGHT"
+    if named(settings.integrator).ends_at:
+        wanted["integrator"] = DEFAULT
     return {name: value for name, value in wanted.items() if getattr(settings, name) != value}
 
 
@@ -100,7 +102,7 @@ def plan(
     _add_structures(variants, absent, settings, accelerator, triangles)
     _add_precisions(variants, settings)
     _add_samplers(variants, settings)
-    _add_integrators(variants, absent, settings, effects)
+    _add_integrators(variants, absent, scene, effects)
     _add_bounces(variants, absent, settings, on)
     _add_shortcuts(variants, settings, on)
     _add_light_sampling(variants, absent, settings, on)
@@ -139,15 +141,31 @@ def _add_samplers(variants: list[Variant], settings: Settings) -> None:
             variants.append(Variant(f"{family.title} sampler", "Samplers", family.reason, {"sampler": name}, rank=4))
 
 
-def _add_integrators(variants: list[Variant], absent: list[str], settings: Settings, effects: Effects) -> None:
-    obstacle = no_photons(effects)
-    if obstacle:
-        absent.append(f"Photon maps: {obstacle}.")
-        return
+def _add_integrators(variants: list[Variant], absent: list[str], scene: Scene, effects: Effects) -> None:
+    settings = scene.settings
+    if named(settings.integrator).ends_at:  # whose effects lack what the others follow
+        effects = effects_of(replace(scene, settings=replace(settings, integrator=DEFAULT)))
+    here = _why_the_same(effects, named(settings.integrator))
     for name, kind in INTEGRATORS.items():
-        if name != settings.integrator:
+        if name == settings.integrator:
+            continue
+        same = _why_the_same(effects, kind)
+        if same:
+            absent.append(f"{kind.title}: {same}.")
+        elif not (here and name == DEFAULT):
             variants.append(Variant(kind.title.lower(), "Integrators", kind.reason, {"integrator": name}, biased=True,
                                     rank=5))  # fmt: skip
+
+
+def _why_the_same(effects: Effects, kind: Integrator) -> str:
+    """Why an integrator would draw the scene as paths do; "": it would not."""
+    if kind.photons:
+        return no_photons(effects)
+    if kind.ends_at and not (
+        effects["indirect light"].on and any(effects[f"{bounce} bounces"].on for bounce in kind.ends_at)
+    ):
+        return "no light goes from one matt surface to another"
+    return ""
 
 
 def _add_bounces(variants: list[Variant], absent: list[str], settings: Settings, on: set[str]) -> None:
