@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import bpy
+from luch import integrators
 
 from ..settings import effective, follows_cycles
 
@@ -23,12 +25,13 @@ class LuchPanel:
         return context.engine in cls.COMPAT_ENGINES
 
 
-def draw_settings(layout: Any, scene: Any, *names: str) -> None:
-    """One row a setting; where Cycles' value holds, it stands beside."""
+def draw_settings(layout: Any, scene: Any, *names: str, idle: Collection[str] = ()) -> None:
+    """One row a setting; where Cycles' value holds, it stands beside. idle: those that change nothing are dimmed."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     for name in names:
         row = layout.row()
+        row.active = name not in idle
         row.prop(scene.luch, name)
         if follows_cycles(scene, name):
             value = effective(scene, name)
@@ -113,6 +116,7 @@ class LUCH_RENDER_PT_light_paths(LuchPanel, bpy.types.Panel):
             "transparent_max_bounces",
             "min_light_bounces",
             "min_transparent_bounces",
+            idle={f"{kind}_bounces" for kind in integrators.named(context.scene.luch.integrator).ends_at},
         )
 
 

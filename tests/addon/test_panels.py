@@ -18,10 +18,13 @@ class Layout:
 
     def __init__(self) -> None:
         self.drawn: list[str] = []
+        self.dimmed: list[str] = []
+        self.active = True
 
     def prop(self, owner: Any, name: str, **options: object) -> None:
         assert name in owner.bl_rna.properties, f"{owner.bl_rna.identifier} has no property {name}"
         self.drawn.append(name)
+        self.dimmed += [] if self.active else [name]
 
     def label(self, text: str, icon: str = "NONE") -> None:
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
@@ -52,6 +55,18 @@ def draw(panel: Any, scene: bpy.types.Scene, **context: object) -> list[str]:
     assert panel.poll(space)
     panel.draw(SimpleNamespace(layout=layout, draw_shape=getattr(panel, "draw_shape", None)), space)
     return layout.drawn
+
+
+@pytest.mark.parametrize(
+    ("integrator", "dimmed"), [("PATH", []), ("DISTRIBUTION", ["diffuse_bounces", "volume_bounces"])]
+)
+def test_limits_that_the_integrator_does_not_reach_are_dimmed(
+    scene: bpy.types.Scene, integrator: str, dimmed: list[str]
+) -> None:
+    scene.luch.integrator = integrator
+    layout = Layout()
+    panels.LUCH_RENDER_PT_light_paths.draw(SimpleNamespace(layout=layout), SimpleNamespace(scene=scene))
+    assert layout.dimmed == dimmed and "glossy_bounces" in layout.drawn
 
 
 @pytest.mark.parametrize("panel", panels.CLASSES, ids=lambda panel: panel.__name__)
