@@ -250,11 +250,12 @@ def test_two_hundred_moves_of_the_camera_take_no_more_memory() -> None:
         place = at(0.2 + 0.003 * number, 0.1, 6.0)
         size = large if number % 2 else scene.film
         render(replace(scene, camera=replace(scene.camera, matrix=place), film=size), kept=kept)
-        if number in (49, 199):
+        if number % 50 == 49:
             gc.collect()
             marks.append(resident_mib())
     assert kept.builds == 1
-    assert marks[1] - marks[0] < 1.0, marks
+    # A leak takes its share in every fifty; an allocator that has served other tests takes a step once.
+    assert np.median(np.diff(marks)) < 1.0 / 3.0, marks
 
 
 def test_a_view_that_turns_on_is_seen_before_a_renderer_is_built_for_where_it_is() -> None:
