@@ -137,7 +137,7 @@ void Reader::read_settings(const py::object& settings) {
     limits.glossy = bounces("glossy") + 1;
     limits.transmission = bounces("transmission") + 1;
     limits.volume = bounces("volume") + 1;
-    limits.transparent = count("transparent_bounces");
+    limits.transparent = bounces("transparent");
     limits.min_bounces = count("min_light_bounces") + 1;
     limits.min_transparent = count("min_transparent_bounces") + 1;
     limits.clamp_direct = number("clamp_direct");

@@ -11,12 +11,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from luch.render import render
-from luch.scene import F32, Camera, Film, Instances, Material, Mesh, Object, Scene, Settings, World
+from luch.scene import Camera, Film, Instances, Material, Mesh, Object, Scene, Settings, World
 from luch.shader import ProgramBuilder
 from support import accel_meshes
 from support.asked import every_device
 from support.closures import ROUGHNESS
+from support.hard_scenes import picture
 
 SIZE = 12  # pixels
 GGX, BECKMANN, MULTI_GGX = 0, 1, 2  # the order of Microfacets in bsdf/params.h
@@ -70,10 +70,6 @@ def scene_of(
         film=Film(width=SIZE, height=SIZE),
         settings=settings,
     )
-
-
-def picture(scene: Scene) -> F32:
-    return render(scene).passes["Combined"][..., :3]
 
 
 def above(scale: float) -> Camera:

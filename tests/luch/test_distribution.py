@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from luch import samplers
 from luch.effects import effects_of
-from luch.render import render
 from luch.scene import Material, Scene
 from luch.shader import ProgramBuilder
 from support.effects import closure, program
 from support.everything import quad
-from support.hard_scenes import instances_of
+from support.hard_scenes import instances_of, picture
 from support.through_glass import ALBEDO, HALF, grey, objects_of, scene_through_glass
 
 
@@ -33,11 +33,7 @@ def under_a_ceiling(leaf: Callable[[ProgramBuilder], None], **settings: Any) -> 
                    instances=instances_of(range(2), [np.eye(3, 4)] * 2))  # fmt: skip
 
 
-def picture(scene: Scene) -> np.ndarray[Any, np.dtype[np.float32]]:
-    return render(scene).passes["Combined"][..., :3]
-
-
-@pytest.mark.parametrize("sampler", ["SOBOL", "INDEPENDENT", "LATTICE"])
+@pytest.mark.parametrize("sampler", samplers.NAMES)
 def test_a_matt_floor_has_direct_light_alone(sampler: str) -> None:
     """A sun of pi W/m2 straight above leaves the albedo as radiance; the ceiling's share is what paths add."""
     direct = picture(under_a_ceiling(grey, sampler=sampler))

@@ -17,12 +17,8 @@ from luch.render import render
 from luch.scene import Light, Material, Scene
 from support.effects import closure, program
 from support.everything import quad
-from support.hard_scenes import instances_of
+from support.hard_scenes import instances_of, picture
 from support.through_glass import ALBEDO, SUN, glass, grey, objects_of, radiance_seen, scene_through_glass
-
-
-def picture(scene: Scene) -> Any:
-    return render(scene).passes["Combined"][..., :3]
 
 
 @pytest.mark.parametrize("sampler", samplers.NAMES)

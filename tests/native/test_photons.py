@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from luch._native import core
 from luch.cuda import photons
 from luch.render import render
-from luch.scene import Film, Light, Material, Scene
+from luch.scene import Film, Light, Material
 from support.devices import both, check_equal
 from support.effects import program
 from support.everything import everything
+from support.hard_scenes import picture
 from support.through_glass import glass, scene_through_glass
 
 PASSES = ["Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color", "Transmission Direct",
           "Transmission Indirect", "Transmission Color"]  # fmt: skip
-
-
-def picture(scene: Scene) -> Any:
-    return render(scene).passes["Combined"][..., :3]
 
 
 def test_threads_and_steps_change_no_bit() -> None:
